@@ -1,0 +1,103 @@
+//! Tile shapes: each mask is one layer of a texture array, with coverage and shade per texel.
+
+use crate::error::{Error, Result};
+
+/// Texels along each side of a mask layer.
+pub const MASK_SIDE: usize = 256;
+/// Coverage from which a texel belongs to the tile; below it the tile has a hole there.
+pub const COVERAGE_THRESHOLD: u8 = 128;
+/// Largest number of layers in a set: what every Vulkan 1.3 device offers in an array image.
+pub const MASK_LAYERS_MAX: usize = 256;
+
+/// One texel: whether the tile is there, and how bright its colour is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Texel {
+    /// 0 is a hole, 255 is full; the tile is opaque from [`COVERAGE_THRESHOLD`] on.
+    pub coverage: u8,
+    /// Factor of every colour channel: a channel `c` becomes `(c * shade + 127) / 255`.
+    pub shade: u8,
+}
+
+/// A tile shape of [`MASK_SIDE`] x [`MASK_SIDE`] texels; row 0 lies at v = -h/2, column 0 at u = -w/2.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mask {
+    texels: Vec<Texel>,
+}
+
+impl Mask {
+    /// A mask from its texels, row by row.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there are not exactly [`MASK_SIDE`]² texels.
+    pub fn new(texels: Vec<Texel>) -> Result<Self> {
+        if texels.len() != MASK_SIDE * MASK_SIDE {
+            return Err(Error::Usage(format!(
+                "a mask needs {MASK_SIDE}x{MASK_SIDE} texels, this one has {}",
+                texels.len()
+            )));
+        }
+        Ok(Self { texels })
+    }
+
+    /// The full square: every texel covered at full brightness.
+    #[must_use]
+    pub fn square() -> Self {
+        Self { texels: vec![Texel { coverage: 255, shade: 255 }; MASK_SIDE * MASK_SIDE] }
+    }
+
+    /// The texels, row by row.
+    #[must_use]
+    pub fn texels(&self) -> &[Texel] {
+        &self.texels
+    }
+
+    /// The texel at `column`, `row`, both below [`MASK_SIDE`].
+    #[must_use]
+    pub fn texel(&self, column: u32, row: u32) -> Texel {
+        self.texels[row as usize * MASK_SIDE + column as usize]
+    }
+}
+
+/// The masks that the flies of a lane may wear; layer 0 is always [`Mask::square`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MaskSet {
+    layers: Vec<Mask>,
+}
+
+impl Default for MaskSet {
+    fn default() -> Self {
+        Self { layers: vec![Mask::square()] }
+    }
+}
+
+impl MaskSet {
+    /// The set of the square and `others`, which become layers 1, 2, ...
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there are more than [`MASK_LAYERS_MAX`] layers.
+    pub fn with_layers(others: Vec<Mask>) -> Result<Self> {
+        if others.len() >= MASK_LAYERS_MAX {
+            return Err(Error::Usage(format!(
+                "at most {} masks besides the square, not {}",
+                MASK_LAYERS_MAX - 1,
+                others.len()
+            )));
+        }
+        let mut layers = vec![Mask::square()];
+        layers.extend(others);
+        Ok(Self { layers })
+    }
+
+    /// All layers; the first is the square.
+    #[must_use]
+    pub fn layers(&self) -> &[Mask] {
+        &self.layers
+    }
+}
+
+/// `color` under a texel's shade: each channel `(c * shade + 127) / 255`.
+#[must_use]
+pub fn shaded(color: [u8; 3], shade: u8) -> [u8; 3] {
+    color.map(|channel| ((u32::from(channel) * u32::from(shade) + 127) / 255) as u8)
+}
