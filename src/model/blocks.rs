@@ -11,7 +11,6 @@ use super::tile::{Canvas, Tile};
 pub struct BlockLists {
     side_px: u32,
     columns: u32,
-    rows: u32,
     /// Depth keys ([`Fly::depth_key`]) in rising order; the low 32 bits are the fly's index.
     lists: Vec<Vec<u64>>,
 }
@@ -29,7 +28,7 @@ impl BlockLists {
     #[must_use]
     pub fn new(canvas: &Canvas, side_px: u32) -> Self {
         let (columns, rows) = (canvas.width_px.div_ceil(side_px), canvas.height_px.div_ceil(side_px));
-        Self { side_px, columns, rows, lists: vec![Vec::new(); columns as usize * rows as usize] }
+        Self { side_px, columns, lists: vec![Vec::new(); columns as usize * rows as usize] }
     }
 
     /// Blocks along the width.
@@ -96,7 +95,7 @@ impl BlockLists {
     fn blocks_of(&self, tile: &Tile) -> impl Iterator<Item = usize> + use<> {
         let (side, columns) = (self.side_px as i32, self.columns as usize);
         // An empty tile has x0 > x1, but both may lie in one block.
-        let column_range = if tile.is_empty() { 1..=0 } else { tile.x0 / side..=tile.x1 / side };
+        let column_range = if tile.is_empty() { 0..0 } else { tile.x0 / side..tile.x1 / side + 1 };
         (tile.y0 / side..=tile.y1 / side)
             .flat_map(move |row| column_range.clone().map(move |column| row as usize * columns + column as usize))
     }

@@ -53,7 +53,7 @@ impl Amplitudes {
     /// All amplitudes times `factor_q16` / 65536.
     #[must_use]
     pub fn scaled(self, factor_q16: u32) -> Self {
-        let scale = |step: StepQ16| (i128::from(step) * i128::from(factor_q16) >> 16) as i64;
+        let scale = |step: StepQ16| ((i128::from(step) * i128::from(factor_q16)) >> 16) as i64;
         Self {
             position: scale(self.position),
             z: scale(self.z),
