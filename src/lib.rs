@@ -6,7 +6,9 @@
 //! a positive value means that the fly helps.
 
 pub mod cpu;
+pub mod engine;
 pub mod error;
+pub mod evolve;
 pub mod model;
 
 pub use error::{Error, Result};
