@@ -5,10 +5,13 @@
 //! absolute errors (SAE, lower is better); the marginal fitness of a fly is the SAE without it minus the SAE with it, so
 //! a positive value means that the fly helps.
 
+pub mod archive;
 pub mod cpu;
 pub mod engine;
 pub mod error;
 pub mod evolve;
 pub mod model;
+pub mod output;
+pub mod photo;
 
 pub use error::{Error, Result};

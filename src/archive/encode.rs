@@ -1,0 +1,123 @@
+//! From a population to the bytes of a `.npz` file.
+
+use std::io::{Cursor, Write};
+
+use npyz::{AutoSerialize, DType, WriterBuilder};
+use serde_json::{Map, Value};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use super::{GENE_COLUMNS, HEADER_MEMBER, Header, SCHEMA};
+use crate::error::{Error, Result};
+use crate::model::fly::Genes;
+use crate::model::mask::MASK_SIDE;
+use crate::model::population::FLY_COUNT_MAX;
+use crate::model::{Fly, Mask, Population};
+
+/// Deflate level of every member, 1 to 9.
+const LEVEL: i64 = 6;
+
+/// The population with the marginal fitness of each fly as a `.npz` file; `meta` goes into its `meta.json`.
+///
+/// # Errors
+/// [`Error::Usage`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the file
+/// (`schema`, `width_px`, `height_px`, `background`), or if there are more than [`FLY_COUNT_MAX`] flies.
+pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
+    let fly_count = population.flies.len();
+    if fly_count != fitness.len() || fly_count > FLY_COUNT_MAX {
+        return Err(Error::Usage(format!(
+            "a population of {fly_count} flies with {} values of fitness cannot be written: there must be one value per \
+             fly, and at most {FLY_COUNT_MAX} flies",
+            fitness.len()
+        )));
+    }
+    if let Some(key) = ["schema", "width_px", "height_px", "background"].iter().find(|&&key| meta.contains_key(key)) {
+        return Err(Error::Usage(format!("the metadata of a population cannot have a `{key}`: the file has its own")));
+    }
+    write_members(population, fitness, meta)
+        .map_err(|error| Error::Usage(format!("the population cannot be written: {error}")))
+}
+
+fn write_members(
+    population: &Population,
+    fitness: &[i64],
+    meta: &Map<String, Value>,
+) -> zip::result::ZipResult<Vec<u8>> {
+    let flies = &population.flies;
+    let mut members = Members::new();
+    for (column, name) in GENE_COLUMNS.into_iter().enumerate() {
+        members.add_column(name, "<f4", flies.iter().map(|fly| gene_values(fly)[column]))?;
+    }
+    members.add_column("fitness", "<i8", fitness.iter().copied())?;
+    members.add_column("mask", "<u2", flies.iter().map(|fly| fly.mask))?;
+    members.add_column("alive", "|b1", flies.iter().map(|fly| fly.alive))?;
+    for (index, mask) in population.masks.layers().iter().enumerate() {
+        members.add_mask(index, mask)?;
+    }
+    let header = Header {
+        schema: SCHEMA,
+        width_px: population.width_px,
+        height_px: population.height_px,
+        background: population.background,
+        meta: meta.clone(),
+    };
+    members.start(HEADER_MEMBER)?;
+    members.zip.write_all(&serde_json::to_vec_pretty(&header).map_err(std::io::Error::from)?)?;
+    Ok(members.zip.finish()?.into_inner())
+}
+
+/// The genes of a fly in the order of [`GENE_COLUMNS`].
+fn gene_values(fly: &Fly) -> [f32; 9] {
+    let Genes { x, y, z, r, g, b, w, h, angle_deg } = fly.genes();
+    [x, y, z, r, g, b, w, h, angle_deg]
+}
+
+/// The zip file under construction.
+struct Members {
+    zip: ZipWriter<Cursor<Vec<u8>>>,
+}
+
+impl Members {
+    fn new() -> Self {
+        Self { zip: ZipWriter::new(Cursor::new(Vec::new())) }
+    }
+
+    /// Begins a member; date, permissions and level are fixed so that nothing but the content decides the bytes.
+    fn start(&mut self, name: &str) -> zip::result::ZipResult<()> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .compression_level(Some(LEVEL))
+            .last_modified_time(DateTime::default())
+            .unix_permissions(0o644);
+        self.zip.start_file(name, options)
+    }
+
+    fn add_column<T: AutoSerialize>(
+        &mut self,
+        name: &str,
+        type_string: &str,
+        values: impl ExactSizeIterator<Item = T>,
+    ) -> zip::result::ZipResult<()> {
+        self.add_array(name, type_string, &[values.len() as u64], values)
+    }
+
+    fn add_mask(&mut self, index: usize, mask: &Mask) -> zip::result::ZipResult<()> {
+        let texels = mask.texels().iter().flat_map(|texel| [texel.coverage, texel.shade]);
+        self.add_array(&format!("mask_{index}"), "|u1", &[MASK_SIDE as u64, MASK_SIDE as u64, 2], texels)
+    }
+
+    fn add_array<T: AutoSerialize>(
+        &mut self,
+        name: &str,
+        type_string: &str,
+        shape: &[u64],
+        values: impl Iterator<Item = T>,
+    ) -> zip::result::ZipResult<()> {
+        let dtype = DType::Plain(type_string.parse().expect("the type strings of this file are valid"));
+        self.start(&npyz::npz::file_name_from_array_name(name))?;
+        let mut array = npyz::WriteOptions::new().dtype(dtype).shape(shape).writer(&mut self.zip).begin_nd()?;
+        array.extend(values)?;
+        array.finish()?;
+        Ok(())
+    }
+}

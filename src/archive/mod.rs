@@ -1,0 +1,46 @@
+//! Populations as `.npz` files: what a run found, to be redrawn at any size, continued, or opened with numpy.
+//!
+//! One array per gene (`x y z r g b w h angle`, f32), `fitness` (i64), `mask` (u16), `alive` (bool), the mask layers as
+//! `mask_0`, `mask_1`, ... (u8, 256x256x2: coverage and shade), and `meta.json`. `numpy.load` opens it with no code. Files
+//! have fixed dates, order and compression: the same population gives the same bytes, and save, load, save changes
+//! nothing.
+
+mod encode;
+mod read;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::model::Population;
+
+pub use encode::encode;
+pub use read::read;
+
+/// Version of the file's layout.
+const SCHEMA: u32 = 1;
+/// The columns of floats, in the order of the file.
+const GENE_COLUMNS: [&str; 9] = ["x", "y", "z", "r", "g", "b", "w", "h", "angle"];
+/// Member of the zip file that holds the [`Header`].
+const HEADER_MEMBER: &str = "meta.json";
+
+/// A population as it was read from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Archive {
+    /// The flies with their masks, size and background; every gene lies within its bounds.
+    pub population: Population,
+    /// Marginal fitness of every fly, as it was when the file was written; zeros if the file has none.
+    pub fitness: Vec<i64>,
+    /// What else the writer told: scheme, seed, versions, hash of the input.
+    pub meta: Map<String, Value>,
+}
+
+/// The contents of `meta.json`: what the arrays need to be understood, and beside it the writer's own keys.
+#[derive(Debug, Serialize, Deserialize)]
+struct Header {
+    schema: u32,
+    width_px: u32,
+    height_px: u32,
+    background: [u8; 3],
+    #[serde(flatten)]
+    meta: Map<String, Value>,
+}

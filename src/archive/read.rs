@@ -1,0 +1,222 @@
+//! From a `.npz` file to a population, trusting nothing in it.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use npyz::{Deserialize, NpyFile, Order};
+use zip::ZipArchive;
+use zip::result::ZipError;
+
+use super::{Archive, GENE_COLUMNS, HEADER_MEMBER, Header, SCHEMA};
+use crate::error::{Error, Result};
+use crate::model::fly::Genes;
+use crate::model::mask::{MASK_LAYERS_MAX, MASK_SIDE, Texel};
+use crate::model::population::FLY_COUNT_MAX;
+use crate::model::target::TARGET_SIDE_MAX_PX;
+use crate::model::{Fly, Mask, MaskSet, Population};
+
+/// Most bytes of a column: eight per fly and an array header.
+const COLUMN_BYTES_MAX: u64 = 8 * FLY_COUNT_MAX as u64 + ARRAY_HEADER_BYTES_MAX as u64 + 16;
+/// Most bytes of `meta.json`.
+const HEADER_BYTES_MAX: u64 = 1 << 20;
+/// Most bytes of the text that describes an array; numpy writes about 120.
+const ARRAY_HEADER_BYTES_MAX: usize = 4096;
+
+/// Reads the population at `path`, ours or one that numpy wrote.
+///
+/// Columns of floats may be f32 or f64; `fitness` may be absent. Genes are moved to the nearest bound that they exceed,
+/// angles wrap.
+///
+/// # Errors
+/// [`Error::Input`] with the name of the column if the file cannot be read, is no population, lacks a column, or holds
+/// one of another type or length, a value that is not finite, or a mask that does not exist.
+pub fn read(path: &Path) -> Result<Archive> {
+    read_population(path).map_err(|reason| Error::input(path, reason))
+}
+
+fn read_population(path: &Path) -> Result<Archive, String> {
+    let mut members = Members::open(path)?;
+    let header = members.header()?;
+    let masks = members.masks()?;
+    let [x, y, z, r, g, b, w, h, angle] = members.genes()?;
+    let fly_count = x.len();
+    let mask = members.column::<u16>("mask", "u16")?;
+    let alive = members.column::<bool>("alive", "bool")?;
+    let fitness = if members.has("fitness") { members.column("fitness", "i64")? } else { vec![0; fly_count] };
+    let lengths = [("mask", mask.len()), ("alive", alive.len()), ("fitness", fitness.len())];
+    if let Some((name, length)) = lengths.iter().find(|(_, length)| *length != fly_count) {
+        return Err(format!("its column `{name}` has {length} values and `x` has {fly_count}; they must be as many"));
+    }
+    let layer_count = masks.layers().len();
+    if let Some(fly) = mask.iter().position(|&mask| usize::from(mask) >= layer_count) {
+        return Err(format!(
+            "its column `mask` asks for mask {} and the file has {layer_count} (fly {fly})",
+            mask[fly]
+        ));
+    }
+    let flies = (0..fly_count)
+        .map(|i| {
+            let genes =
+                Genes { x: x[i], y: y[i], z: z[i], r: r[i], g: g[i], b: b[i], w: w[i], h: h[i], angle_deg: angle[i] };
+            let fly = Fly { alive: alive[i], ..Fly::from_genes(&genes, mask[i]) };
+            fly.clamped(header.width_px, header.height_px)
+        })
+        .collect();
+    let Header { width_px, height_px, background, meta, .. } = header;
+    Ok(Archive { population: Population { width_px, height_px, background, masks, flies }, fitness, meta })
+}
+
+/// The members of a zip file; every failure is a sentence for the user.
+struct Members {
+    zip: ZipArchive<BufReader<File>>,
+}
+
+impl Members {
+    fn open(path: &Path) -> Result<Self, String> {
+        let file = File::open(path).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => "there is no such file; check its name".to_owned(),
+            _ => format!("cannot be read ({error})"),
+        })?;
+        let zip = ZipArchive::new(BufReader::new(file))
+            .map_err(|error| format!("is not a population: no readable .npz file ({error})"))?;
+        Ok(Self { zip })
+    }
+
+    fn has(&self, array: &str) -> bool {
+        self.zip.index_for_name(&npyz::npz::file_name_from_array_name(array)).is_some()
+    }
+
+    /// The bytes of a member, at most `bytes_max` of them: a few bytes of zip may stand for terabytes.
+    fn bytes(&mut self, member: &str, bytes_max: u64) -> Result<Vec<u8>, String> {
+        let member_file = self.zip.by_name(member).map_err(|error| match error {
+            ZipError::FileNotFound => format!("is not a population: it has no `{member}`"),
+            error => format!("its `{member}` cannot be read ({error})"),
+        })?;
+        let mut bytes = Vec::new();
+        member_file
+            .take(bytes_max + 1)
+            .read_to_end(&mut bytes)
+            .map_err(|error| format!("its `{member}` is broken ({error}); get the file again"))?;
+        if bytes.len() as u64 > bytes_max {
+            return Err(format!("its `{member}` has more than {bytes_max} bytes, the most that is read"));
+        }
+        Ok(bytes)
+    }
+
+    fn header(&mut self) -> Result<Header, String> {
+        let bytes = self.bytes(HEADER_MEMBER, HEADER_BYTES_MAX)?;
+        let header: Header = serde_json::from_slice(&bytes)
+            .map_err(|error| format!("its `{HEADER_MEMBER}` does not describe a population ({error})"))?;
+        if header.schema != SCHEMA {
+            return Err(format!("has layout {}, this program reads {SCHEMA}; use a version that fits", header.schema));
+        }
+        let sides = 1..=TARGET_SIDE_MAX_PX;
+        if !sides.contains(&header.width_px) || !sides.contains(&header.height_px) {
+            return Err(format!(
+                "its `{HEADER_MEMBER}` gives a picture of {}x{} px; sides must be 1 to {TARGET_SIDE_MAX_PX} px",
+                header.width_px, header.height_px
+            ));
+        }
+        Ok(header)
+    }
+
+    /// The columns [`GENE_COLUMNS`], all of one length and finite.
+    fn genes(&mut self) -> Result<[Vec<f32>; 9], String> {
+        let mut columns: [Vec<f32>; 9] = Default::default();
+        for (index, name) in GENE_COLUMNS.into_iter().enumerate() {
+            let column = self.float_column(name)?;
+            if let Some(fly) = column.iter().position(|value| !value.is_finite()) {
+                return Err(format!("its column `{name}` has a value that is no finite number (fly {fly})"));
+            }
+            if index > 0 && column.len() != columns[0].len() {
+                let (length, fly_count) = (column.len(), columns[0].len());
+                return Err(format!(
+                    "its column `{name}` has {length} values and `x` has {fly_count}; they must be as many"
+                ));
+            }
+            columns[index] = column;
+        }
+        Ok(columns)
+    }
+
+    fn float_column(&mut self, name: &str) -> Result<Vec<f32>, String> {
+        let bytes = self.array_bytes(name, COLUMN_BYTES_MAX)?;
+        if array(name, &bytes)?.dtype().num_bytes() == Some(size_of::<f64>()) {
+            let wide: Vec<f64> = column_of(name, &bytes, "f32 or f64")?;
+            return Ok(wide.into_iter().map(|value| value as f32).collect());
+        }
+        column_of(name, &bytes, "f32 or f64")
+    }
+
+    fn column<T: Deserialize>(&mut self, name: &str, type_name: &str) -> Result<Vec<T>, String> {
+        let bytes = self.array_bytes(name, COLUMN_BYTES_MAX)?;
+        column_of(name, &bytes, type_name)
+    }
+
+    /// The layers `mask_0`, `mask_1`, ...; the first must be the square.
+    fn masks(&mut self) -> Result<MaskSet, String> {
+        let square = self.mask(0)?;
+        if square != Mask::square() {
+            return Err("its `mask_0` is not the full square; put other masks into `mask_1` and on".to_owned());
+        }
+        let mut others = Vec::new();
+        while self.has(&format!("mask_{}", others.len() + 1)) && others.len() < MASK_LAYERS_MAX {
+            others.push(self.mask(others.len() + 1)?);
+        }
+        MaskSet::with_layers(others).map_err(|error| error.to_string())
+    }
+
+    fn mask(&mut self, index: usize) -> Result<Mask, String> {
+        let name = format!("mask_{index}");
+        let bytes = self.array_bytes(&name, (MASK_SIDE * MASK_SIDE * 2 + ARRAY_HEADER_BYTES_MAX + 16) as u64)?;
+        let array = array(&name, &bytes)?;
+        let side = MASK_SIDE as u64;
+        if array.shape() != [side, side, 2] || array.order() != Order::C {
+            return Err(format!("its `{name}` is not {side}x{side}x2 in C order"));
+        }
+        let values: Vec<u8> =
+            array.into_vec().map_err(|error| format!("its `{name}` is not of type u8 or is cut short ({error})"))?;
+        let texels = values.as_chunks::<2>().0.iter().map(|&[coverage, shade]| Texel { coverage, shade }).collect();
+        Mask::new(texels).map_err(|error| error.to_string())
+    }
+
+    fn array_bytes(&mut self, name: &str, bytes_max: u64) -> Result<Vec<u8>, String> {
+        self.bytes(&npyz::npz::file_name_from_array_name(name), bytes_max)
+    }
+}
+
+/// The array in a member, its header parsed.
+fn array<'a>(name: &str, bytes: &'a [u8]) -> Result<NpyFile<&'a [u8]>, String> {
+    if array_header_bytes(bytes).is_none_or(|length| length > ARRAY_HEADER_BYTES_MAX) {
+        return Err(format!("its `{name}` is not an array of numpy"));
+    }
+    NpyFile::new(bytes).map_err(|error| format!("its `{name}` is not an array of numpy ({error})"))
+}
+
+/// Length of the text that describes an array. It is a Python literal: a long one could nest deeper than a stack holds.
+fn array_header_bytes(bytes: &[u8]) -> Option<usize> {
+    let version = *bytes.get(6)?;
+    if version == 1 {
+        return Some(usize::from(u16::from_le_bytes(*bytes.get(8..)?.first_chunk()?)));
+    }
+    usize::try_from(u32::from_le_bytes(*bytes.get(8..)?.first_chunk()?)).ok()
+}
+
+fn column_of<T: Deserialize>(name: &str, bytes: &[u8], type_name: &str) -> Result<Vec<T>, String> {
+    let array = array(name, bytes)?;
+    let &[length] = array.shape() else {
+        return Err(format!("its column `{name}` has {} dimensions instead of one", array.shape().len()));
+    };
+    if length > FLY_COUNT_MAX as u64 {
+        return Err(format!(
+            "its column `{name}` has {length} values, more than the {FLY_COUNT_MAX} flies of the largest population"
+        ));
+    }
+    let descr = array.dtype().descr();
+    let wrong_type = || format!("its column `{name}` is of type {descr} instead of {type_name}");
+    let values = array.data::<T>().map_err(|_| wrong_type())?;
+    values
+        .collect::<std::io::Result<Vec<T>>>()
+        .map_err(|error| format!("its column `{name}` is broken or cut short ({error})"))
+}

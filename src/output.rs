@@ -1,0 +1,104 @@
+//! Writing a result so that a reader sees the old file or the whole new one, never a half.
+//!
+//! The bytes go to a temporary file beside the target, which then takes the target's name. Nothing here knows what the
+//! bytes mean, or whether the user agreed to replace what is there.
+
+use std::fs::{self, File, Metadata};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use crate::error::{Error, Result};
+
+/// Writes `bytes` to `path`, replacing what is there in one step.
+///
+/// A new file gets the permissions that the user's umask asks for; a replaced one keeps its own. A symbolic link stays,
+/// and the file that it names is replaced. A device or a pipe (such as `/dev/stdout`) is written to directly. On failure
+/// the old file is as it was, and nothing is left beside it.
+///
+/// # Errors
+/// [`Error::Output`] if the folder is missing or may not be written, the disk is full, or `path` is a folder.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let write = || match Place::of(path)? {
+        Place::Stream => File::options().write(true).open(path)?.write_all(bytes),
+        Place::File { target, old } => {
+            let mut file = create_beside(&target)?;
+            file.write_all(bytes)?;
+            if let Some(old) = old {
+                file.as_file().set_permissions(old.permissions())?;
+            }
+            file.as_file().sync_all()?;
+            file.persist(&target)?;
+            Ok(())
+        }
+    };
+    write().map_err(|error| output_error(path, &error))
+}
+
+/// Whether [`write_atomically`] could write to `path` now, found out without leaving anything behind.
+///
+/// To be asked before hours of work. It cannot foresee that the disk fills up.
+///
+/// # Errors
+/// [`Error::Output`], as [`write_atomically`] would give.
+pub fn check_writable(path: &Path) -> Result<()> {
+    let check = || match Place::of(path)? {
+        // Opening a pipe would wait for its reader.
+        Place::Stream => Ok(()),
+        Place::File { target, .. } => create_beside(&target)?.close(),
+    };
+    check().map_err(|error| output_error(path, &error))
+}
+
+/// What a path leads to.
+enum Place {
+    /// A device, pipe or socket: it cannot be replaced, only written to.
+    Stream,
+    /// A regular file, or the place for one; `target` has no symbolic link as its last part.
+    File { target: PathBuf, old: Option<Metadata> },
+}
+
+impl Place {
+    fn of(path: &Path) -> io::Result<Self> {
+        match fs::metadata(path) {
+            Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
+            Ok(found) if found.is_file() => Ok(Self::File { target: fs::canonicalize(path)?, old: Some(found) }),
+            Ok(_) => Ok(Self::Stream),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                Ok(Self::File { target: path.to_owned(), old: None })
+            }
+            Err(error) => Err(error),
+        }
+    }
+}
+
+/// An empty temporary file in the folder of `target`: only within one file system is a rename a single step.
+fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".smalti-").suffix(".partial");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // The umask takes its bits away, as for any file that a program creates.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+fn output_error(path: &Path, error: &io::Error) -> Error {
+    use io::ErrorKind::{
+        IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull,
+    };
+    let reason = match error.kind() {
+        IsADirectory => "is a folder; name a file in it".to_owned(),
+        NotFound | NotADirectory => "its folder does not exist; create it first, or name another one".to_owned(),
+        PermissionDenied | ReadOnlyFilesystem => {
+            "its folder may not be written to; change its permissions, or name another one".to_owned()
+        }
+        StorageFull | QuotaExceeded => "the disk is full; free some space, or name a folder on another disk".to_owned(),
+        _ => format!("cannot be written ({error}); name another file"),
+    };
+    Error::output(path, reason)
+}

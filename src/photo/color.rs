@@ -1,0 +1,168 @@
+//! From what a decoder gives to opaque 8-bit sRGB: ICC profile, then alpha, then 8 bits with one rounding.
+//!
+//! A row at a time in 16 bits per channel, so that a 16-bit picture in a linear profile keeps its shadows.
+
+use std::sync::Arc;
+
+use image::{DynamicImage, ImageBuffer, Pixel, RgbImage};
+use moxcms::{ColorProfile, DataColorSpace, Layout, Transform16BitExecutor, TransformOptions};
+
+/// The picture without its profile and its alpha; transparent pixels show `background`.
+///
+/// A profile that cannot be used is left out, with a warning.
+pub(super) fn to_opaque_srgb(
+    image: DynamicImage,
+    icc: Option<&[u8]>,
+    background: [u8; 3],
+    warnings: &mut Vec<String>,
+) -> RgbImage {
+    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, image.color().has_color()));
+    let profile = profile.unwrap_or_else(|reason| {
+        warnings.push(format!("its ICC profile is ignored, so colours may be off: {reason}"));
+        Profile::Srgb
+    });
+    let rows = Rows { profile, background };
+    match image {
+        DynamicImage::ImageRgb8(image) if matches!(rows.profile, Profile::Srgb) => image,
+        DynamicImage::ImageLuma8(image) => rows.convert(&image, widen),
+        DynamicImage::ImageLumaA8(image) => rows.convert(&image, widen),
+        DynamicImage::ImageRgb8(image) => rows.convert(&image, widen),
+        DynamicImage::ImageRgba8(image) => rows.convert(&image, widen),
+        DynamicImage::ImageRgb32F(image) => rows.convert(&image, quantised),
+        DynamicImage::ImageRgba32F(image) => rows.convert(&image, quantised),
+        image => rows.convert(&image.into_rgba16(), |channel| channel),
+    }
+}
+
+/// An 8-bit channel in 16 bits: 0 stays 0, 255 becomes 65,535.
+fn widen(channel: u8) -> u16 {
+    u16::from(channel) * 257
+}
+
+/// A float channel in 16 bits: [0, 1] becomes [0, 65,535], what lies outside is clipped, NaN is 0.
+fn quantised(channel: f32) -> u16 {
+    (channel * 65_535.0 + 0.5) as u16
+}
+
+/// What a channel means.
+enum Profile {
+    Srgb,
+    Rgb(Arc<Transform16BitExecutor>),
+    Gray(Arc<Transform16BitExecutor>),
+}
+
+impl Profile {
+    /// The profile in `icc` for a picture that has colour or is grey, or why it cannot be used.
+    fn parse(icc: &[u8], has_color: bool) -> Result<Self, String> {
+        let profile = ColorProfile::new_from_slice(icc).map_err(|error| format!("it is broken ({error})"))?;
+        let srgb = ColorProfile::new_srgb();
+        let transform = |from, to| {
+            let options = TransformOptions { prefer_fixed_point: false, ..TransformOptions::default() };
+            profile
+                .create_transform_16bit(from, &srgb, to, options)
+                .map_err(|error| format!("it is not usable ({error})"))
+        };
+        match (profile.color_space, has_color) {
+            (DataColorSpace::Rgb, _) => transform(Layout::Rgba, Layout::Rgba).map(Self::Rgb),
+            (DataColorSpace::Gray, false) => transform(Layout::Gray, Layout::Rgb).map(Self::Gray),
+            (other, _) => Err(format!("it is for {other:?} pixels; save the picture as sRGB")),
+        }
+    }
+
+    /// Brings a row of RGBA pixels to sRGB; alpha stays.
+    fn apply(&self, row: &mut [[u16; 4]], scratch: &mut Vec<u16>) {
+        let done = match self {
+            Self::Srgb => Ok(()),
+            Self::Rgb(transform) => {
+                scratch.clear();
+                scratch.extend_from_slice(row.as_flattened());
+                transform.transform(scratch, row.as_flattened_mut())
+            }
+            Self::Gray(transform) => {
+                let gray: Vec<u16> = row.iter().map(|pixel| pixel[0]).collect();
+                scratch.clear();
+                scratch.resize(gray.len() * 3, 0);
+                let done = transform.transform(&gray, scratch);
+                for (pixel, rgb) in row.iter_mut().zip(scratch.as_chunks::<3>().0) {
+                    pixel[..3].copy_from_slice(rgb);
+                }
+                done
+            }
+        };
+        done.expect("source and destination hold one row each");
+    }
+}
+
+/// How every row is brought to opaque 8-bit sRGB.
+struct Rows {
+    profile: Profile,
+    background: [u8; 3],
+}
+
+impl Rows {
+    fn convert<P: Pixel>(
+        &self,
+        image: &ImageBuffer<P, Vec<P::Subpixel>>,
+        to_16_bits: impl Fn(P::Subpixel) -> u16,
+    ) -> RgbImage {
+        let (width_px, height_px) = image.dimensions();
+        let mut opaque = Vec::with_capacity(width_px as usize * height_px as usize * 3);
+        let mut row = Vec::with_capacity(width_px as usize);
+        let mut scratch = Vec::new();
+        for pixels in image.rows() {
+            row.clear();
+            row.extend(pixels.map(|pixel| pixel.to_rgba().0.map(&to_16_bits)));
+            self.profile.apply(&mut row, &mut scratch);
+            opaque.extend(row.iter().flat_map(|&pixel| self.composite(pixel)));
+        }
+        RgbImage::from_raw(width_px, height_px, opaque).expect("every row has been converted")
+    }
+
+    /// One pixel over the background, in 8 bits, rounded once: with 8-bit input this is `(c*a + b*(255-a) + 127) / 255`.
+    fn composite(&self, [r, g, b, alpha]: [u16; 4]) -> [u8; 3] {
+        let alpha = u64::from(alpha);
+        let over = |channel: u16, behind: u8| {
+            let sum = u64::from(channel) * alpha + u64::from(behind) * 257 * (65_535 - alpha);
+            ((sum + 65_535 * 257 / 2) / (65_535 * 257)) as u8
+        };
+        let [behind_r, behind_g, behind_b] = self.background;
+        [over(r, behind_r), over(g, behind_g), over(b, behind_b)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Profile, Rows, quantised, widen};
+
+    #[test]
+    fn compositing_8_bit_channels_rounds_to_the_nearest_8_bit_value() {
+        for alpha in 0..=255_u8 {
+            for channel in [0, 1, 77, 128, 254, 255] {
+                let rows = Rows { profile: Profile::Srgb, background: [0, 100, 255] };
+                let pixel = [widen(channel), widen(channel), widen(channel), widen(alpha)];
+                let expected = [0_u32, 100, 255].map(|behind| {
+                    let (channel, alpha) = (u32::from(channel), u32::from(alpha));
+                    ((channel * alpha + behind * (255 - alpha) + 127) / 255) as u8
+                });
+                assert_eq!(rows.composite(pixel), expected, "channel {channel} at alpha {alpha}");
+            }
+        }
+    }
+
+    #[test]
+    fn sixteen_bit_channels_are_rounded_to_the_nearest_8_bit_value() {
+        let rows = Rows { profile: Profile::Srgb, background: [0; 3] };
+        for channel in 0..=u16::MAX {
+            let nearest = (f64::from(channel) / 257.0).round() as u8;
+            assert_eq!(rows.composite([channel, channel, channel, u16::MAX]), [nearest; 3], "channel {channel}");
+        }
+    }
+
+    #[test]
+    fn float_channels_are_clipped_and_rounded() {
+        let cases = [(-1.0, 0), (0.0, 0), (0.5, 32_768), (1.0, 65_535), (7.0, 65_535), (f32::NAN, 0)];
+        for (channel, expected) in cases {
+            assert_eq!(quantised(channel), expected, "{channel}");
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! From a file's bytes to a [`Photo`]: limits first, then decode, colour, orientation and size.
+
+use std::fs::File;
+use std::io::{self, Cursor, Read};
+use std::path::Path;
+
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, RgbImage};
+use sha2::{Digest, Sha256};
+
+use super::{Photo, color, jpeg_segments, resize};
+use crate::error::{Error, Result};
+
+/// Largest side in px of a picture that is read.
+pub const SIDE_MAX_PX: u32 = 65_535;
+/// Most pixels of a picture that is read: 2^28.
+pub const PIXEL_COUNT_MAX: u64 = 1 << 28;
+/// Most bytes that a decoder may allocate: [`PIXEL_COUNT_MAX`] pixels of four floats.
+const DECODE_BYTES_MAX: u64 = PIXEL_COUNT_MAX * 16;
+/// Most bytes of a file that is read.
+const FILE_BYTES_MAX: u64 = 1 << 32;
+/// Bytes that tell the format of every picture that is read.
+const SIGNATURE_BYTES: u64 = 64;
+/// The formats that are read, for messages.
+const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP and GIF";
+
+/// What is done to a picture while it is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// 8-bit sRGB colour that shows through where the picture is transparent.
+    pub background: [u8; 3],
+    /// Size in px that the longer side is reduced to; smaller pictures stay as they are. At least 1; `None` keeps the size.
+    pub long_side_px: Option<u32>,
+}
+
+/// A picture that was read, and what is worth knowing about its file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Loaded {
+    /// The picture: upright, in sRGB, opaque, fitted to size.
+    pub photo: Photo,
+    /// Width in px of the upright picture before it was fitted.
+    pub original_width_px: u32,
+    /// Height in px of the upright picture before it was fitted.
+    pub original_height_px: u32,
+    /// SHA-256 of the file's bytes, 64 lower-case hexadecimal digits.
+    pub sha256: String,
+    /// What was ignored in the file, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the picture at `path`; its content, not its name, tells the format.
+///
+/// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
+/// background, 8 bits, EXIF orientation, Lanczos3 to the size asked for. Decoded bytes are the same on every x86-64
+/// machine; on other processors an ICC profile may round a channel by one.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, or exceeds
+/// [`SIDE_MAX_PX`], [`PIXEL_COUNT_MAX`] or 4 GiB.
+pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
+    let (format, bytes) = read_picture_file(path)?;
+    let mut warnings = Vec::new();
+    let upright =
+        decode(&bytes, format, options.background, &mut warnings).map_err(|reason| Error::input(path, reason))?;
+    let (original_width_px, original_height_px) = upright.dimensions();
+    let photo = resize::fit(&photo_of(&upright), options.long_side_px);
+    Ok(Loaded { photo, original_width_px, original_height_px, sha256: sha256_hex(&bytes), warnings })
+}
+
+/// The bytes of the file at `path`, once its first bytes have shown that it is a picture.
+fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
+    let unreadable = |error: io::Error| Error::input(path, why_unreadable(&error));
+    let mut file = File::open(path).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    // Not the whole file yet: `/dev/zero` has no end.
+    file.by_ref().take(SIGNATURE_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.is_empty() {
+        return Err(Error::input(path, "the file is empty (0 bytes); get it again"));
+    }
+    let format = known_format(&bytes)
+        .ok_or_else(|| Error::input(path, format!("not a picture that can be read; {FORMATS} can")))?;
+    file.take(FILE_BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > FILE_BYTES_MAX {
+        return Err(Error::input(path, "the file has more than 4 GiB, the most that is read; save a smaller version"));
+    }
+    Ok((format, bytes))
+}
+
+/// Why opening or reading an input failed, and what to do.
+pub(super) fn why_unreadable(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "there is no such file; check its name".to_owned(),
+        io::ErrorKind::IsADirectory => "is a folder; name a file in it".to_owned(),
+        io::ErrorKind::PermissionDenied => "may not be read; change its permissions".to_owned(),
+        _ => format!("cannot be read ({error}); try a copy of it"),
+    }
+}
+
+/// The format that the first bytes of a file tell, if it is one that is read.
+fn known_format(bytes: &[u8]) -> Option<ImageFormat> {
+    use ImageFormat::{Bmp, Gif, Jpeg, Png, Tiff, WebP};
+    image::guess_format(bytes).ok().filter(|format| matches!(format, Png | Jpeg | WebP | Tiff | Bmp | Gif))
+}
+
+/// The upright 8-bit sRGB picture in `bytes`, or a sentence that says why there is none.
+fn decode(
+    bytes: &[u8],
+    format: ImageFormat,
+    background: [u8; 3],
+    warnings: &mut Vec<String>,
+) -> Result<RgbImage, String> {
+    let broken = |error: ImageError| why_undecodable(format, error);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(DECODE_BYTES_MAX);
+    reader.limits(limits);
+    let mut decoder = reader.into_decoder().map_err(broken)?;
+    check_size(decoder.dimensions())?;
+    // The JPEG decoder fills what is missing with grey and calls it a success.
+    if format == ImageFormat::Jpeg && !jpeg_segments::is_complete(bytes) {
+        return Err(broken_sentence(format, "its end is missing"));
+    }
+    let orientation = decoder.orientation().map_err(broken)?;
+    let profile = decoder.icc_profile().map_err(broken)?;
+    let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    let mut image = DynamicImage::ImageRgb8(color::to_opaque_srgb(decoded, profile.as_deref(), background, warnings));
+    image.apply_orientation(orientation);
+    Ok(image.into_rgb8())
+}
+
+/// Refuses sizes that are nothing or too much, before anything of that size is allocated.
+fn check_size((width_px, height_px): (u32, u32)) -> Result<(), String> {
+    if width_px == 0 || height_px == 0 {
+        return Err(format!("the picture has no pixels ({width_px}x{height_px}); save it anew"));
+    }
+    if width_px.max(height_px) > SIDE_MAX_PX || u64::from(width_px) * u64::from(height_px) > PIXEL_COUNT_MAX {
+        return Err(format!(
+            "the picture has {width_px}x{height_px} px, more than the {SIDE_MAX_PX} px a side or {PIXEL_COUNT_MAX} px \
+             in all that are read; save a smaller version"
+        ));
+    }
+    Ok(())
+}
+
+fn why_undecodable(format: ImageFormat, error: ImageError) -> String {
+    match error {
+        ImageError::Limits(_) => {
+            "the picture needs more than 4 GiB to decode, the most that is read; save a smaller version".to_owned()
+        }
+        ImageError::Unsupported(error) => {
+            format!("this kind of {format:?} is not read ({error}); convert the picture to an 8-bit RGB PNG")
+        }
+        error => broken_sentence(format, &error.to_string()),
+    }
+}
+
+fn broken_sentence(format: ImageFormat, detail: &str) -> String {
+    format!("the {format:?} data is broken or cut short ({detail}); get the file again or save it anew")
+}
+
+fn photo_of(image: &RgbImage) -> Photo {
+    let (pixels, _) = image.as_raw().as_chunks::<3>();
+    Photo { width_px: image.width(), height_px: image.height(), pixels: pixels.to_vec() }
+}
+
+fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}

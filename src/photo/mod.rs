@@ -1,0 +1,27 @@
+//! Pictures in and out: decode, bring upright and to sRGB, fit to size, encode; and the metadata in what we wrote.
+//!
+//! The only user of the image crates. Every step gives the same bytes on every machine and with any number of threads,
+//! since the pixels decide all that evolves from them; a test holds hashes of decoded pictures. Knows no fly and no
+//! target.
+
+mod color;
+mod decode;
+mod encode;
+mod jpeg_segments;
+mod metadata;
+mod resize;
+
+pub use decode::{Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
+pub use encode::{Format, encode, encode_jpeg, encode_png};
+pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
+
+/// A picture in memory: 8-bit sRGB, no alpha.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Photo {
+    /// Width in px, at least 1.
+    pub width_px: u32,
+    /// Height in px, at least 1.
+    pub height_px: u32,
+    /// Red, green and blue of every pixel, row by row from the top; `width_px * height_px` of them.
+    pub pixels: Vec<[u8; 3]>,
+}
