@@ -6,5 +6,6 @@
 //! a positive value means that the fly helps.
 
 pub mod error;
+pub mod vk;
 
 pub use error::{Error, Result};
