@@ -115,8 +115,14 @@ impl Uploads {
         self.regions.push(Region { target, copy: vk::BufferCopy { src_offset, dst_offset: offset, size } });
     }
 
-    /// Adds a write of a whole layer.
+    /// Adds a write of a whole layer; a later write of the same layer takes its place.
     pub(super) fn add_image_layer(&mut self, image: &Arc<Image>, layer: u32, bytes: &[u8]) {
+        let same = |copy: &vk::BufferImageCopy| copy.image_subresource.base_array_layer == layer;
+        if let Some((_, copy)) = self.images.iter().find(|(other, copy)| Arc::ptr_eq(other, image) && same(copy)) {
+            let start = copy.buffer_offset as usize;
+            self.bytes[start..start + bytes.len()].copy_from_slice(bytes);
+            return;
+        }
         self.bytes.resize(self.bytes.len().next_multiple_of(IMAGE_ALIGNMENT), 0);
         let copy = image.layer_copy(layer, self.bytes.len() as u64);
         self.bytes.extend_from_slice(bytes);
