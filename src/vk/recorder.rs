@@ -29,10 +29,12 @@ pub struct Recorder {
     // Owns both command buffers.
     pool: Owned<vk::CommandPool>,
     fence: Owned<vk::Fence>,
-    recording: bool,
+    is_recording: bool,
     submission: u64,
     last_scope: Scope,
     last_pass: &'static str,
+    /// A pass that is leaked instead of dropped leaves this set.
+    is_pass_open: bool,
     stop_query: Option<u32>,
     label: Vec<u8>,
     failure: Option<Error>,
@@ -61,10 +63,11 @@ impl Recorder {
             pass_commands,
             pool,
             fence: Owned::new(device, fence, name),
-            recording: false,
+            is_recording: false,
             submission: device.next_submission(),
             last_scope: Scope::Earlier,
             last_pass: "none",
+            is_pass_open: false,
             stop_query: None,
             label: Vec::new(),
             failure: None,
@@ -143,7 +146,7 @@ impl Recorder {
     /// # Errors
     /// [`Error::Vulkan`] if the ticket is of another submission, or `bytes` has another size.
     pub fn read_into(&self, ticket: &ReadTicket, bytes: &mut [u8]) -> Result<()> {
-        if self.recording || ticket.submission != self.submission {
+        if self.is_recording || ticket.submission != self.submission {
             return Err(refused("read-back", "the ticket is not of the submission that ran last"));
         }
         if bytes.len() as u64 != ticket.size_bytes {
@@ -166,14 +169,14 @@ impl Recorder {
 
     /// Starts a submission unless one is being recorded.
     pub(super) fn begin(&mut self) -> Result<()> {
-        if self.recording {
+        if self.is_recording {
             return Ok(());
         }
         // SAFETY: V1, V2, V3.
         unsafe { self.device.raw().reset_command_pool(self.pool.get(), vk::CommandPoolResetFlags::empty()) }
             .map_err(|result| call_failed("vkResetCommandPool", result))?;
         begin_commands(&self.device, self.pass_commands)?;
-        self.recording = true;
+        self.is_recording = true;
         self.submission = self.device.next_submission();
         self.last_scope = Scope::Earlier;
         self.last_pass = "none";
@@ -186,8 +189,10 @@ impl Recorder {
     /// Opens a pass: the barrier to what came before, its label and its clock.
     pub(super) fn begin_pass(&mut self, name: &'static str, scope: Scope) -> Result<()> {
         self.begin()?;
+        self.require_closed()?;
         self.record_boundary(scope);
         self.last_pass = name;
+        self.is_pass_open = true;
         if let Some(debug_utils) = self.device.debug_utils() {
             self.label.clear();
             self.label.extend_from_slice(name.as_bytes());
@@ -203,6 +208,7 @@ impl Recorder {
 
     /// Closes what `begin_pass` opened.
     pub(super) fn end_pass(&mut self) {
+        self.is_pass_open = false;
         if let (Some(timer), Some(query)) = (&self.timer, self.stop_query.take()) {
             timer.record_stamp(self.pass_commands, query);
         }
@@ -210,6 +216,13 @@ impl Recorder {
             // SAFETY: V1, V3.
             unsafe { debug_utils.cmd_end_debug_utils_label(self.pass_commands) };
         }
+    }
+
+    fn require_closed(&self) -> Result<()> {
+        if self.is_pass_open {
+            return Err(refused(format!("recording of pass {}", self.last_pass), "it was never ended"));
+        }
+        Ok(())
     }
 
     /// Records the barrier between the last work and `next`.
@@ -243,6 +256,7 @@ impl Recorder {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
+        self.require_closed()?;
         if !self.uploads.is_empty() {
             begin_commands(&self.device, self.upload_commands)?;
             self.uploads.record(&self.device, self.upload_commands)?;
@@ -260,7 +274,8 @@ impl Recorder {
 
     /// Forgets the submission; its results stay readable. Nothing may be in flight.
     pub(super) fn clear(&mut self) {
-        self.recording = false;
+        self.is_recording = false;
+        self.is_pass_open = false;
         self.failure = None;
         self.uploads.clear();
         self.read_backs.clear();
@@ -272,7 +287,7 @@ impl Recorder {
     }
 
     pub(super) fn is_recording(&self) -> bool {
-        self.recording
+        self.is_recording
     }
 
     pub(super) fn has_uploads(&self) -> bool {

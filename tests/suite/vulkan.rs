@@ -4,9 +4,9 @@ use std::process::Command;
 use std::sync::Arc;
 
 use smalti::vk::{
-    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, ComputePipeline, ComputeShader,
-    DepthTest, Device, DeviceKind, DeviceOptions, GraphicsPipeline, GraphicsShaders, Image, ImageFormat, ImageShape,
-    Instance, InstanceOptions, Recorder, RenderTargets, Residence, Staging, Timing, Validation,
+    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, ComputePass, ComputePipeline,
+    ComputeShader, DepthTest, Device, DeviceKind, DeviceOptions, GraphicsPipeline, GraphicsShaders, Image, ImageFormat,
+    ImageShape, Instance, InstanceOptions, Recorder, RenderTargets, Residence, Staging, Timing, Validation,
 };
 use smalti::{Error, Result};
 
@@ -317,6 +317,10 @@ fn a_mistake_in_a_pass_is_returned_by_the_submission_and_the_recorder_goes_on() 
             assert!(message.contains(part), "{message}");
         }
 
+        std::mem::forget(recorder.compute_pass("forgotten")?);
+        let message = recorder.submit_and_wait().expect_err("the pass never ends").to_string();
+        assert!(message.contains("pass forgotten failed: it was never ended"), "{message}");
+
         recorder.write_buffer(&buffer, 0, &[7; 16])?;
         assert_eq!(read_all(&mut recorder, &buffer)?, [7; 16]);
         Ok(())
@@ -415,8 +419,8 @@ fn software_vulkan_is_described_as_a_device_that_lacks_nothing() {
     });
 }
 
-/// Two dispatches of which the second reads what the first wrote; correct only with a barrier between them.
-fn dispatch_twice(device: &Arc<Device>, barrier: bool) -> Result<()> {
+/// Two dispatches of which the second reads what the first wrote; correct only if `between` is a barrier.
+fn dispatch_twice(device: &Arc<Device>, between: fn(&mut ComputePass<'_>)) -> Result<()> {
     let (a, b) = (storage(device, "a", 256)?, storage(device, "b", 256)?);
     let pipeline = neighbours(device, 0)?;
     let forth = BindingGroup::create("forth", pipeline.layout(), &[Binding::Buffer(&a), Binding::Buffer(&b)])?;
@@ -428,9 +432,7 @@ fn dispatch_twice(device: &Arc<Device>, barrier: bool) -> Result<()> {
         pass.bind(&pipeline, &forth);
         pass.push_constants(bytemuck::cast_slice(&[64_u32, 1]));
         pass.dispatch(1, 1, 1);
-        if barrier {
-            pass.barrier();
-        }
+        between(&mut pass);
         pass.bind(&pipeline, &back);
         pass.dispatch(1, 1, 1);
     }
@@ -439,10 +441,11 @@ fn dispatch_twice(device: &Arc<Device>, barrier: bool) -> Result<()> {
 
 #[test]
 fn the_canary_dies_of_a_missing_barrier() {
-    for (barrier, hazards) in [(true, false), (false, true)] {
-        let (result, messages) = canary::watch(&DeviceOptions::default(), |device| dispatch_twice(&device, barrier));
+    let cases: [(fn(&mut ComputePass<'_>), bool); 2] = [(|pass| pass.barrier(), false), (|_| {}, true)];
+    for (between, is_hazard) in cases {
+        let (result, messages) = canary::watch(&DeviceOptions::default(), |device| dispatch_twice(&device, between));
         result.expect("the dispatches run either way");
-        assert_eq!(messages.iter().any(|message| message.contains("SYNC-HAZARD")), hazards, "{messages:?}");
+        assert_eq!(messages.iter().any(|message| message.contains("SYNC-HAZARD")), is_hazard, "{messages:?}");
     }
 }
 
@@ -468,8 +471,8 @@ fn child_that_opens_vulkan() {
     let opened = Instance::create(InstanceOptions { validation: Validation::On })
         .and_then(|instance| instance.physical_devices());
     match opened {
-        Ok(devices) => println!("opened {} devices", devices.len()),
-        Err(error) => println!("exit {}: {error}", error.exit_code()),
+        Ok(devices) => eprintln!("opened {} devices", devices.len()),
+        Err(error) => eprintln!("exit {}: {error}", error.exit_code()),
     }
 }
 
@@ -479,7 +482,7 @@ fn output_of_child(variable: &str, value: &std::path::Path) -> String {
         .env(variable, value)
         .output()
         .expect("the test binary runs");
-    String::from_utf8_lossy(&output.stdout).into_owned()
+    String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 #[test]
