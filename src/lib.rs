@@ -10,8 +10,10 @@ pub mod cpu;
 pub mod engine;
 pub mod error;
 pub mod evolve;
+pub mod gpu;
 pub mod model;
 pub mod output;
 pub mod photo;
+pub mod vk;
 
 pub use error::{Error, Result};
