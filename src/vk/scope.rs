@@ -106,6 +106,32 @@ mod tests {
     }
 
     #[test]
+    fn drawing_waits_for_and_shows_its_attachments_and_what_its_shaders_read() {
+        let (before, after) = (barrier(Scope::Earlier, Scope::Graphics), barrier(Scope::Graphics, Scope::Transfer));
+        for (stage, read, write) in [
+            (
+                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+                vk::AccessFlags2::COLOR_ATTACHMENT_READ,
+                vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+            ),
+            (
+                vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS,
+                vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ,
+                vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            ),
+            (
+                vk::PipelineStageFlags2::VERTEX_SHADER | vk::PipelineStageFlags2::FRAGMENT_SHADER,
+                vk::AccessFlags2::SHADER_STORAGE_READ | vk::AccessFlags2::SHADER_SAMPLED_READ,
+                vk::AccessFlags2::NONE,
+            ),
+        ] {
+            assert!(before.dst_stage_mask.contains(stage) && after.src_stage_mask.contains(stage), "{stage:?}");
+            assert!(before.dst_access_mask.contains(read | write), "{read:?} {write:?}");
+            assert!(after.src_access_mask.contains(write), "{write:?}");
+        }
+    }
+
+    #[test]
     fn a_barrier_makes_no_reads_available_and_the_host_waits_for_writes_only() {
         for scope in ALL {
             assert_eq!(barrier(scope, Scope::HostRead).dst_access_mask, vk::AccessFlags2::HOST_READ);

@@ -4,14 +4,15 @@ use std::process::Command;
 use std::sync::Arc;
 
 use smalti::vk::{
-    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, ComputePass, ComputePipeline,
-    ComputeShader, DepthTest, Device, DeviceKind, DeviceOptions, GraphicsPipeline, GraphicsShaders, Image, ImageFormat,
-    ImageShape, Instance, InstanceOptions, Recorder, RenderTargets, Residence, Staging, Timing, Validation,
+    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, ComputePipeline, ComputeShader,
+    DepthTest, Device, DeviceKind, DeviceOptions, GraphicsPipeline, GraphicsShaders, Image, ImageFormat, ImageShape,
+    Instance, InstanceOptions, Recorder, RenderTargets, Residence, Staging, Timing, Validation,
 };
 use smalti::{Error, Result};
 
 use crate::canary;
 
+// Compiled from the sources beside them by `glslc --target-env=vulkan1.3 NAME -o NAME.spv`.
 const NEIGHBOURS: &[u8] = include_bytes!("../golden/vk/neighbours.comp.spv");
 const SQUARES_VERTEX: &[u8] = include_bytes!("../golden/vk/squares.vert.spv");
 const SQUARES_FRAGMENT: &[u8] = include_bytes!("../golden/vk/squares.frag.spv");
@@ -50,7 +51,7 @@ fn neighbours(device: &Arc<Device>, added: u32) -> Result<Arc<ComputePipeline>> 
         &ComputeShader {
             name: "neighbours",
             spirv: &words(NEIGHBOURS),
-            specialization: &[(3, added)],
+            specialization: &[(3, added), (0, 64)],
             bindings: &TWO_BUFFERS,
             push_constant_bytes: 8,
         },
@@ -153,11 +154,38 @@ fn a_compute_shader_sees_its_constants_and_each_dispatch_the_one_before_it() {
 }
 
 #[test]
-fn what_the_commands_name_stays_alive_until_they_have_run() {
+fn a_pass_sees_the_work_of_every_pass_before_it() {
+    on_both_paths(|device| {
+        let [a, b, c] = [storage(device, "a", 16)?, storage(device, "b", 16)?, storage(device, "c", 16)?];
+        let pipeline = neighbours(device, 1)?;
+        let a_to_b = BindingGroup::create("a to b", pipeline.layout(), &[Binding::Buffer(&a), Binding::Buffer(&b)])?;
+        let b_to_c = BindingGroup::create("b to c", pipeline.layout(), &[Binding::Buffer(&b), Binding::Buffer(&c)])?;
+        let c_to_a = BindingGroup::create("c to a", pipeline.layout(), &[Binding::Buffer(&c), Binding::Buffer(&a)])?;
+        let mut recorder = Recorder::create(device, "test", Timing::Off)?;
+        recorder.write_buffer(&a, 0, bytemuck::cast_slice(&[1_u32, 2, 3, 4]))?;
+        recorder.transfer_pass("fill")?.fill(&a, 4, 4, 9);
+        for group in [&a_to_b, &b_to_c, &c_to_a] {
+            let mut pass = recorder.compute_pass("neighbours")?;
+            pass.bind(&pipeline, group);
+            pass.push_constants(bytemuck::cast_slice(&[4_u32, 2]));
+            pass.dispatch(1, 1, 1);
+        }
+        recorder.transfer_pass("copy")?.copy((&a, 0), (&b, 8), 8);
+        let read = read_all(&mut recorder, &b)?;
+        let once = neighbours_twin(&[1, 9, 3, 4], 2, 1);
+        let thrice = neighbours_twin(&neighbours_twin(&once, 2, 1), 2, 1);
+        let expected = [once[0], once[1], thrice[0], thrice[1]];
+        assert_eq!(bytemuck::pod_collect_to_vec::<u8, u32>(&read), expected);
+        Ok(())
+    });
+}
+
+#[test]
+fn what_the_commands_name_lives_exactly_until_they_have_run() {
     on_both_paths(|device| {
         let result = storage(device, "result", 16)?;
         let mut recorder = Recorder::create(device, "test", Timing::Off)?;
-        {
+        let (group, pipeline, source) = {
             let source = storage(device, "source", 16)?;
             recorder.write_buffer(&source, 0, bytemuck::cast_slice(&[1_u32, 2, 3, 4]))?;
             let pipeline = neighbours(device, 0)?;
@@ -167,9 +195,13 @@ fn what_the_commands_name_stays_alive_until_they_have_run() {
             pass.bind(&pipeline, &group);
             pass.push_constants(bytemuck::cast_slice(&[4_u32, 1]));
             pass.dispatch(1, 1, 1);
-        }
+            (Arc::downgrade(&group), Arc::downgrade(&pipeline), Arc::downgrade(&source))
+        };
+        assert_eq!([group.strong_count(), pipeline.strong_count()], [1, 1], "before the submission");
         let read = read_all(&mut recorder, &result)?;
         assert_eq!(bytemuck::pod_collect_to_vec::<u8, u32>(&read), [3, 5, 7, 5]);
+        let counts = [group.strong_count(), pipeline.strong_count(), source.strong_count()];
+        assert_eq!(counts, [0, 0, 0], "after the submission");
         Ok(())
     });
 }
@@ -230,7 +262,8 @@ fn the_nearer_of_two_squares_covers_exactly_its_pixels_in_both_attachments() {
             ColorTarget { image: &ids, clear: ClearColor::Uint([u32::MAX, 0, 0, 0]) },
         ];
         let targets = RenderTargets { colors: &colors, depth: Some(&depth), width_px: 32, height_px: 24 };
-        {
+        // Twice, so that the second pass has to wait for the attachments of the first.
+        for _ in 0..2 {
             let mut pass = recorder.render_pass("squares", &targets)?;
             pass.bind(&pipeline, &group);
             pass.push_constants(bytemuck::cast_slice(&[32.0_f32, 24.0]));
@@ -419,8 +452,8 @@ fn software_vulkan_is_described_as_a_device_that_lacks_nothing() {
     });
 }
 
-/// Two dispatches of which the second reads what the first wrote; correct only if `between` is a barrier.
-fn dispatch_twice(device: &Arc<Device>, between: fn(&mut ComputePass<'_>)) -> Result<()> {
+/// Two dispatches of which the second reads what the first wrote; correct only with a barrier between them.
+fn dispatch_twice(device: &Arc<Device>, barriers: usize) -> Result<()> {
     let (a, b) = (storage(device, "a", 256)?, storage(device, "b", 256)?);
     let pipeline = neighbours(device, 0)?;
     let forth = BindingGroup::create("forth", pipeline.layout(), &[Binding::Buffer(&a), Binding::Buffer(&b)])?;
@@ -432,7 +465,9 @@ fn dispatch_twice(device: &Arc<Device>, between: fn(&mut ComputePass<'_>)) -> Re
         pass.bind(&pipeline, &forth);
         pass.push_constants(bytemuck::cast_slice(&[64_u32, 1]));
         pass.dispatch(1, 1, 1);
-        between(&mut pass);
+        for _ in 0..barriers {
+            pass.barrier();
+        }
         pass.bind(&pipeline, &back);
         pass.dispatch(1, 1, 1);
     }
@@ -441,9 +476,8 @@ fn dispatch_twice(device: &Arc<Device>, between: fn(&mut ComputePass<'_>)) -> Re
 
 #[test]
 fn the_canary_dies_of_a_missing_barrier() {
-    let cases: [(fn(&mut ComputePass<'_>), bool); 2] = [(|pass| pass.barrier(), false), (|_| {}, true)];
-    for (between, is_hazard) in cases {
-        let (result, messages) = canary::watch(&DeviceOptions::default(), |device| dispatch_twice(&device, between));
+    for (barriers, is_hazard) in [(1, false), (0, true)] {
+        let (result, messages) = canary::watch(&DeviceOptions::default(), |device| dispatch_twice(&device, barriers));
         result.expect("the dispatches run either way");
         assert_eq!(messages.iter().any(|message| message.contains("SYNC-HAZARD")), is_hazard, "{messages:?}");
     }
