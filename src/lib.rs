@@ -13,5 +13,6 @@ pub mod evolve;
 pub mod model;
 pub mod output;
 pub mod photo;
+pub mod vk;
 
 pub use error::{Error, Result};

@@ -1,0 +1,269 @@
+//! The logical device: one queue for graphics and compute, the memory allocator and the pipeline cache.
+
+use std::ffi::CString;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use ash::ext::debug_utils;
+use ash::vk;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
+
+use super::physical::{self, DeviceInfo};
+use super::{Instance, call_failed, lock, refused};
+use crate::error::{Error, Result};
+
+const PORTABILITY_SUBSET: &std::ffi::CStr = c"VK_KHR_portability_subset";
+const MIB: u64 = 1 << 20;
+
+/// How bytes reach buffers on the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Staging {
+    /// Directly where the CPU and the device share fast memory, else through a staging buffer.
+    #[default]
+    Auto,
+    /// Always through a staging buffer, so that a test on software Vulkan runs what a discrete GPU runs.
+    Forced,
+}
+
+/// How to create a [`Device`].
+#[derive(Debug, Clone, Default)]
+pub struct DeviceOptions {
+    /// How bytes reach buffers on the device.
+    pub staging: Staging,
+    /// What [`Device::pipeline_cache_bytes`] returned earlier, perhaps for another device or driver; empty for none.
+    pub pipeline_cache: Vec<u8>,
+}
+
+/// A device that is ready to work.
+pub struct Device {
+    pipeline_cache: vk::PipelineCache,
+    allocator: Mutex<Allocator>,
+    queue: Mutex<vk::Queue>,
+    queue_family: u32,
+    staging: Staging,
+    submissions: AtomicU64,
+    info: DeviceInfo,
+    // After the allocator, which returns its memory to the device.
+    raw: RawDevice,
+}
+
+/// The Vulkan device itself; destroyed after everything that was made from it.
+struct RawDevice {
+    functions: ash::Device,
+    debug_utils: Option<debug_utils::Device>,
+    _instance: Arc<Instance>,
+}
+
+impl Drop for RawDevice {
+    fn drop(&mut self) {
+        // SAFETY: V1, V2: every wrapper holds the device, so none is left.
+        unsafe { self.functions.destroy_device(None) };
+    }
+}
+
+impl Device {
+    /// Opens the device that `info` describes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuitableDevice`] if it lacks something or is no longer there; [`Error::Vulkan`] if the driver refuses.
+    pub fn create(instance: &Arc<Instance>, info: &DeviceInfo, options: &DeviceOptions) -> Result<Arc<Self>> {
+        let physical = find_physical(instance, info)?;
+        let (queue_family, _) = physical::queue_family(instance.raw(), physical).ok_or_else(|| {
+            Error::NoSuitableDevice { why: format!("{} has no queue for graphics and compute", info.name) }
+        })?;
+        let functions = create_raw(instance, physical, queue_family, info)?;
+        let debug_utils = instance.has_debug_utils().then(|| debug_utils::Device::new(instance.raw(), &functions));
+        let raw = RawDevice { functions, debug_utils, _instance: Arc::clone(instance) };
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw().clone(),
+            device: raw.functions.clone(),
+            physical_device: physical,
+            debug_settings: AllocatorDebugSettings::default(),
+            buffer_device_address: false,
+            // Small first blocks: many pictures are small, and software Vulkan pays for every page that it maps.
+            allocation_sizes: AllocationSizes::new(8 * MIB, 8 * MIB)
+                .with_max_device_memblock_size(256 * MIB)
+                .with_max_host_memblock_size(64 * MIB),
+        })
+        .map_err(|error| refused("creation of the memory allocator", error.to_string()))?;
+        // SAFETY: V1.
+        let (queue, properties) = unsafe {
+            (raw.functions.get_device_queue(queue_family, 0), instance.raw().get_physical_device_properties(physical))
+        };
+        let device = Self {
+            pipeline_cache: create_pipeline_cache(&raw.functions, &properties, &options.pipeline_cache),
+            allocator: Mutex::new(allocator),
+            queue: Mutex::new(queue),
+            queue_family,
+            staging: options.staging,
+            submissions: AtomicU64::new(0),
+            info: info.clone(),
+            raw,
+        };
+        Ok(Arc::new(device))
+    }
+
+    /// The device's description.
+    #[must_use]
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// How bytes reach buffers on the device.
+    #[must_use]
+    pub fn staging(&self) -> Staging {
+        self.staging
+    }
+
+    /// The compiled pipelines, to be kept for the next start; empty if the driver has none to give.
+    #[must_use]
+    pub fn pipeline_cache_bytes(&self) -> Vec<u8> {
+        // SAFETY: V1.
+        unsafe { self.raw().get_pipeline_cache_data(self.pipeline_cache) }.unwrap_or_default()
+    }
+
+    pub(super) fn raw(&self) -> &ash::Device {
+        &self.raw.functions
+    }
+
+    /// Names and labels for debuggers, where the instance offers them.
+    pub(super) fn debug_utils(&self) -> Option<&debug_utils::Device> {
+        self.raw.debug_utils.as_ref()
+    }
+
+    pub(super) fn allocator(&self) -> &Mutex<Allocator> {
+        &self.allocator
+    }
+
+    pub(super) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
+        lock(&self.queue)
+    }
+
+    pub(super) fn queue_family(&self) -> u32 {
+        self.queue_family
+    }
+
+    pub(super) fn pipeline_cache(&self) -> vk::PipelineCache {
+        self.pipeline_cache
+    }
+
+    /// A number that no other submission of this device has.
+    pub(super) fn next_submission(&self) -> u64 {
+        self.submissions.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Gives a handle its debug name. Names serve people only, so a failure is not worth an error.
+    pub(super) fn set_name<T: vk::Handle>(&self, handle: T, name: &str) {
+        if let (Some(debug_utils), Ok(name)) = (self.debug_utils(), CString::new(name)) {
+            let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+            // SAFETY: V1; the handle was just created and no other thread has it.
+            let _ = unsafe { debug_utils.set_debug_utils_object_name(&info) };
+        }
+    }
+
+    /// Waits until the queue has nothing left to do. A lost device has nothing left either.
+    pub(super) fn wait_idle(&self) {
+        let queue = self.queue();
+        // SAFETY: V1, V3.
+        let _ = unsafe { self.raw().queue_wait_idle(*queue) };
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        self.wait_idle();
+        // SAFETY: V1, V2.
+        unsafe { self.raw().destroy_pipeline_cache(self.pipeline_cache, None) };
+    }
+}
+
+/// The handle behind a description, checked in case a device came or went in between.
+fn find_physical(instance: &Instance, info: &DeviceInfo) -> Result<vk::PhysicalDevice> {
+    if !info.missing.is_empty() {
+        return Err(Error::NoSuitableDevice { why: format!("{} lacks {}", info.name, info.missing.join(", ")) });
+    }
+    let handles = instance.physical_handles()?;
+    let gone = || Error::NoSuitableDevice { why: format!("{} is no longer there; run again", info.name) };
+    let handle = *handles.get(info.index).ok_or_else(gone)?;
+    let now = physical::describe(instance.raw(), handle, info.index)?;
+    if now.uuid == info.uuid { Ok(handle) } else { Err(gone()) }
+}
+
+fn create_raw(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    queue_family: u32,
+    info: &DeviceInfo,
+) -> Result<ash::Device> {
+    let priorities = [1.0];
+    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
+    let mut extensions = Vec::new();
+    // A partial implementation demands that whoever uses it says so.
+    if physical::has_extension(instance.raw(), physical, PORTABILITY_SUBSET)? {
+        extensions.push(PORTABILITY_SUBSET.as_ptr());
+    }
+    let mut features =
+        vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true).maintenance4(true);
+    let create_info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions)
+        .push_next(&mut features);
+    // SAFETY: V1; `DeviceInfo::missing` was empty, so the features are there.
+    unsafe { instance.raw().create_device(physical, &create_info, None) }
+        .map_err(|result| call_failed(format!("vkCreateDevice for {}", info.name), result))
+}
+
+/// A pipeline cache with the bytes of an earlier one if they fit. A device works without one just as well, only slower.
+fn create_pipeline_cache(
+    device: &ash::Device,
+    properties: &vk::PhysicalDeviceProperties,
+    bytes: &[u8],
+) -> vk::PipelineCache {
+    let bytes = if cache_fits(bytes, properties) { bytes } else { &[] };
+    let info = vk::PipelineCacheCreateInfo::default().initial_data(bytes);
+    // SAFETY: V1.
+    unsafe { device.create_pipeline_cache(&info, None) }.unwrap_or_default()
+}
+
+/// Whether the header of a saved pipeline cache (`VkPipelineCacheHeaderVersionOne`) names this device and driver.
+fn cache_fits(bytes: &[u8], properties: &vk::PhysicalDeviceProperties) -> bool {
+    const HEADER_BYTES: usize = 32;
+    let word = |index: usize| -> Option<u32> {
+        Some(u32::from_ne_bytes(bytes.get(index * 4..index * 4 + 4)?.try_into().ok()?))
+    };
+    word(0).is_some_and(|size| size as usize >= HEADER_BYTES && size as usize <= bytes.len())
+        && word(1) == u32::try_from(vk::PipelineCacheHeaderVersion::ONE.as_raw()).ok()
+        && word(2) == Some(properties.vendor_id)
+        && word(3) == Some(properties.device_id)
+        && bytes.get(16..HEADER_BYTES) == Some(properties.pipeline_cache_uuid.as_slice())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_saved_pipeline_cache_fits_only_the_device_and_driver_that_made_it() {
+        let properties = vk::PhysicalDeviceProperties {
+            vendor_id: 0x10de,
+            device_id: 0x2330,
+            pipeline_cache_uuid: [7; 16],
+            ..Default::default()
+        };
+        let mut saved = Vec::new();
+        for word in [32_u32, 1, 0x10de, 0x2330] {
+            saved.extend(word.to_ne_bytes());
+        }
+        saved.extend([7; 16]);
+        assert!(cache_fits(&saved, &properties));
+        for index in [4, 8, 12, 16, 31] {
+            let mut other = saved.clone();
+            other[index] ^= 1;
+            assert!(!cache_fits(&other, &properties), "byte {index} differs");
+        }
+        for length in [0, 3, 16, 31] {
+            assert!(!cache_fits(&saved[..length], &properties), "cut at {length}");
+        }
+    }
+}

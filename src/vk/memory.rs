@@ -1,0 +1,99 @@
+//! Memory behind buffers and images: a piece of the device's allocator that returns itself when dropped.
+
+use std::sync::{Arc, Mutex};
+
+use ash::vk;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::{AllocationError, MemoryLocation};
+
+use super::{Device, lock, refused};
+use crate::error::{Error, Result};
+
+/// Memory that the CPU reads as fast as its own; a mapped window onto a discrete GPU's memory lacks the cache.
+const FAST_FOR_HOST: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::from_raw(
+    vk::MemoryPropertyFlags::HOST_VISIBLE.as_raw()
+        | vk::MemoryPropertyFlags::HOST_COHERENT.as_raw()
+        | vk::MemoryPropertyFlags::HOST_CACHED.as_raw(),
+);
+
+/// What the memory is for.
+pub(super) struct Purpose<'a> {
+    /// Debug name of the buffer or image.
+    pub(super) name: &'a str,
+    /// Who reads and who writes it.
+    pub(super) location: MemoryLocation,
+    /// Whether it holds a buffer; images are laid out by the driver.
+    pub(super) linear: bool,
+}
+
+/// A piece of device memory.
+pub(super) struct Memory {
+    allocation: Mutex<Allocation>,
+    device: Arc<Device>,
+}
+
+impl Memory {
+    /// Takes memory from the device's allocator.
+    pub(super) fn allocate(
+        device: &Arc<Device>,
+        requirements: vk::MemoryRequirements,
+        purpose: &Purpose<'_>,
+    ) -> Result<Self> {
+        let allocation = lock(device.allocator())
+            .allocate(&AllocationCreateDesc {
+                name: purpose.name,
+                requirements,
+                location: purpose.location,
+                linear: purpose.linear,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|error| match error {
+                AllocationError::OutOfMemory => {
+                    Error::OutOfDeviceMemory { name: purpose.name.to_owned(), bytes: requirements.size }
+                }
+                other => refused(format!("allocation of memory for {}", purpose.name), other.to_string()),
+            })?;
+        Ok(Self { allocation: Mutex::new(allocation), device: Arc::clone(device) })
+    }
+
+    pub(super) fn bind_buffer(&self, buffer: vk::Buffer) -> Result<(), vk::Result> {
+        let allocation = lock(&self.allocation);
+        // SAFETY: V1; the memory was allocated for this buffer and is returned after it is destroyed.
+        unsafe { self.device.raw().bind_buffer_memory(buffer, allocation.memory(), allocation.offset()) }
+    }
+
+    pub(super) fn bind_image(&self, image: vk::Image) -> Result<(), vk::Result> {
+        let allocation = lock(&self.allocation);
+        // SAFETY: V1; the memory was allocated for this image and is returned after it is destroyed.
+        unsafe { self.device.raw().bind_image_memory(image, allocation.memory(), allocation.offset()) }
+    }
+
+    /// Whether the CPU reaches the memory directly and reads it at full speed.
+    pub(super) fn is_fast_for_host(&self) -> bool {
+        lock(&self.allocation).memory_properties().contains(FAST_FOR_HOST)
+    }
+
+    /// Copies `bytes` into mapped memory; `None` if it is not mapped or too short.
+    pub(super) fn write(&self, offset: usize, bytes: &[u8]) -> Option<()> {
+        let mut allocation = lock(&self.allocation);
+        let mapped = allocation.mapped_slice_mut()?;
+        mapped.get_mut(offset..offset.checked_add(bytes.len())?)?.copy_from_slice(bytes);
+        Some(())
+    }
+
+    /// Copies mapped memory into `bytes`; `None` if it is not mapped or too short.
+    pub(super) fn read(&self, offset: usize, bytes: &mut [u8]) -> Option<()> {
+        let allocation = lock(&self.allocation);
+        let mapped = allocation.mapped_slice()?;
+        bytes.copy_from_slice(mapped.get(offset..offset.checked_add(bytes.len())?)?);
+        Some(())
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        let allocation = std::mem::take(&mut *lock(&self.allocation));
+        // An allocation that the allocator does not know could only be a bug in it, and there is nobody to tell.
+        let _ = lock(self.device.allocator()).free(allocation);
+    }
+}

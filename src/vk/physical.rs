@@ -1,0 +1,287 @@
+//! What a physical device is and what it lacks, as plain data that can be printed and chosen from without a device.
+
+use std::ffi::CStr;
+
+use ash::vk;
+use serde::Serialize;
+
+use super::call_failed;
+use crate::error::Result;
+
+/// The kind of hardware behind a Vulkan device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum DeviceKind {
+    /// A GPU with its own memory.
+    Discrete,
+    /// A GPU that shares the memory of the CPU.
+    Integrated,
+    /// A GPU lent to a virtual machine.
+    Virtual,
+    /// Software on the CPU.
+    Cpu,
+    /// Anything else.
+    Other,
+}
+
+/// The limits of a device that decide what fits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceLimits {
+    /// Largest storage buffer that a shader can see, in bytes.
+    pub storage_buffer_bytes: u64,
+    /// Most workgroups of one dispatch along x, y and z.
+    pub workgroups: [u32; 3],
+    /// Most invocations of one workgroup.
+    pub workgroup_invocations: u32,
+    /// Shared memory of one workgroup, in bytes.
+    pub shared_memory_bytes: u32,
+    /// Push constants of one pipeline, in bytes.
+    pub push_constant_bytes: u32,
+    /// Longest side of a two-dimensional image, in pixels.
+    pub image_side_px: u32,
+    /// Most layers of an image.
+    pub image_layers: u32,
+    /// Nanoseconds per step of a timestamp.
+    pub timestamp_period_ns: f32,
+    /// Bits of a timestamp that count; 0 where there are no timestamps.
+    pub timestamp_bits: u32,
+}
+
+/// A Vulkan device as `smalti devices` lists it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DeviceInfo {
+    /// Place in the loader's order, counted from 0.
+    pub index: usize,
+    /// Name given by the driver.
+    pub name: String,
+    /// Kind of hardware.
+    pub kind: DeviceKind,
+    /// PCI vendor, or a number that Khronos gave out.
+    pub vendor_id: u32,
+    /// Number given to the device by its vendor.
+    pub device_id: u32,
+    /// Name of the driver; empty below Vulkan 1.3.
+    pub driver_name: String,
+    /// The driver's own words about its version; empty below Vulkan 1.3.
+    pub driver_info: String,
+    /// The driver's version as a plain number; every vendor packs it in its own way.
+    pub driver_version: u32,
+    /// Vulkan version of the device, such as `1.3.230`.
+    pub api_version: String,
+    /// Device UUID in lower-case hexadecimal with dashes; empty below Vulkan 1.3.
+    pub uuid: String,
+    /// Address on the PCI bus, such as `0000:65:00.0`, where the driver tells it.
+    pub pci: Option<String>,
+    /// Memory on the device, in bytes.
+    pub memory_bytes: u64,
+    /// Invocations of a subgroup; 0 below Vulkan 1.3.
+    pub subgroup_size: u32,
+    /// Groups of subgroup operations that shaders may use.
+    pub subgroup_operations: Vec<&'static str>,
+    /// The limits that decide what fits.
+    pub limits: DeviceLimits,
+    /// What the device lacks to be used here, in words; empty means that it can be used.
+    pub missing: Vec<String>,
+}
+
+/// What every shader may rely on.
+const SUBGROUP_NEEDS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
+    vk::SubgroupFeatureFlags::BASIC.as_raw() | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw(),
+);
+
+const SUBGROUP_NAMES: [(vk::SubgroupFeatureFlags, &str); 8] = [
+    (vk::SubgroupFeatureFlags::BASIC, "basic"),
+    (vk::SubgroupFeatureFlags::VOTE, "vote"),
+    (vk::SubgroupFeatureFlags::ARITHMETIC, "arithmetic"),
+    (vk::SubgroupFeatureFlags::BALLOT, "ballot"),
+    (vk::SubgroupFeatureFlags::SHUFFLE, "shuffle"),
+    (vk::SubgroupFeatureFlags::SHUFFLE_RELATIVE, "shuffle-relative"),
+    (vk::SubgroupFeatureFlags::CLUSTERED, "clustered"),
+    (vk::SubgroupFeatureFlags::QUAD, "quad"),
+];
+
+/// Asks the driver everything that [`DeviceInfo`] holds.
+pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> Result<DeviceInfo> {
+    // SAFETY: V1.
+    let properties = unsafe { instance.get_physical_device_properties(handle) };
+    let family = queue_family(instance, handle);
+    let version = properties.api_version;
+    let mut info = DeviceInfo {
+        index,
+        name: text(properties.device_name_as_c_str()),
+        kind: kind_of(properties.device_type),
+        vendor_id: properties.vendor_id,
+        device_id: properties.device_id,
+        driver_name: String::new(),
+        driver_info: String::new(),
+        driver_version: properties.driver_version,
+        api_version: format!(
+            "{}.{}.{}",
+            vk::api_version_major(version),
+            vk::api_version_minor(version),
+            vk::api_version_patch(version)
+        ),
+        uuid: String::new(),
+        pci: None,
+        memory_bytes: local_memory_bytes(instance, handle),
+        subgroup_size: 0,
+        subgroup_operations: Vec::new(),
+        limits: limits_of(&properties.limits, family.map_or(0, |(_, timestamp_bits)| timestamp_bits)),
+        missing: Vec::new(),
+    };
+    if version < vk::API_VERSION_1_3 {
+        // The questions below exist only since Vulkan 1.3; asking an older device would be invalid.
+        info.missing.push(format!("Vulkan 1.3 (the driver offers {})", info.api_version));
+        return Ok(info);
+    }
+    add_modern_properties(instance, handle, &mut info)?;
+    add_missing_features(instance, handle, &mut info.missing);
+    add_missing_formats(instance, handle, &mut info.missing);
+    if family.is_none() {
+        info.missing.push("a queue for graphics and compute".to_owned());
+    }
+    Ok(info)
+}
+
+/// The first queue family for graphics and compute, and the bits of its timestamps.
+pub(super) fn queue_family(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Option<(u32, u32)> {
+    // SAFETY: V1.
+    let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };
+    (0..)
+        .zip(families)
+        .find(|(_, family)| family.queue_flags.contains(vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE))
+        .map(|(index, family)| (index, family.timestamp_valid_bits))
+}
+
+/// Whether the device offers the extension.
+pub(super) fn has_extension(instance: &ash::Instance, handle: vk::PhysicalDevice, name: &CStr) -> Result<bool> {
+    // SAFETY: V1.
+    let extensions = unsafe { instance.enumerate_device_extension_properties(handle) }
+        .map_err(|result| call_failed("vkEnumerateDeviceExtensionProperties", result))?;
+    Ok(extensions.iter().any(|extension| extension.extension_name_as_c_str().is_ok_and(|found| found == name)))
+}
+
+fn kind_of(device_type: vk::PhysicalDeviceType) -> DeviceKind {
+    match device_type {
+        vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+        vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+        vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+        vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+        _ => DeviceKind::Other,
+    }
+}
+
+fn limits_of(limits: &vk::PhysicalDeviceLimits, timestamp_bits: u32) -> DeviceLimits {
+    DeviceLimits {
+        storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+        workgroups: limits.max_compute_work_group_count,
+        workgroup_invocations: limits.max_compute_work_group_invocations,
+        shared_memory_bytes: limits.max_compute_shared_memory_size,
+        push_constant_bytes: limits.max_push_constants_size,
+        image_side_px: limits.max_image_dimension2_d,
+        image_layers: limits.max_image_array_layers,
+        timestamp_period_ns: limits.timestamp_period,
+        timestamp_bits,
+    }
+}
+
+fn local_memory_bytes(instance: &ash::Instance, handle: vk::PhysicalDevice) -> u64 {
+    // SAFETY: V1.
+    let memory = unsafe { instance.get_physical_device_memory_properties(handle) };
+    memory
+        .memory_heaps_as_slice()
+        .iter()
+        .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+        .map(|heap| heap.size)
+        .sum()
+}
+
+fn add_modern_properties(instance: &ash::Instance, handle: vk::PhysicalDevice, info: &mut DeviceInfo) -> Result<()> {
+    let has_pci = has_extension(instance, handle, ash::ext::pci_bus_info::NAME)?;
+    let mut vulkan11 = vk::PhysicalDeviceVulkan11Properties::default();
+    let mut vulkan12 = vk::PhysicalDeviceVulkan12Properties::default();
+    let mut pci = vk::PhysicalDevicePCIBusInfoPropertiesEXT::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut vulkan11).push_next(&mut vulkan12);
+    if has_pci {
+        properties = properties.push_next(&mut pci);
+    }
+    // SAFETY: V1.
+    unsafe { instance.get_physical_device_properties2(handle, &mut properties) };
+
+    info.driver_name = text(vulkan12.driver_name_as_c_str());
+    info.driver_info = text(vulkan12.driver_info_as_c_str());
+    info.uuid = dashed(&vulkan11.device_uuid);
+    info.pci = has_pci
+        .then(|| format!("{:04x}:{:02x}:{:02x}.{:x}", pci.pci_domain, pci.pci_bus, pci.pci_device, pci.pci_function));
+    info.subgroup_size = vulkan11.subgroup_size;
+    let operations = vulkan11.subgroup_supported_operations;
+    info.subgroup_operations =
+        SUBGROUP_NAMES.iter().filter(|(flag, _)| operations.contains(*flag)).map(|&(_, name)| name).collect();
+    if !operations.contains(SUBGROUP_NEEDS)
+        || !vulkan11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
+    {
+        info.missing.push("subgroup arithmetic in compute shaders".to_owned());
+    }
+    Ok(())
+}
+
+fn add_missing_features(instance: &ash::Instance, handle: vk::PhysicalDevice, missing: &mut Vec<String>) {
+    let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
+    // SAFETY: V1.
+    unsafe { instance.get_physical_device_features2(handle, &mut features) };
+    for (available, name) in [
+        (vulkan13.synchronization2, "synchronization2"),
+        (vulkan13.dynamic_rendering, "dynamicRendering"),
+        (vulkan13.maintenance4, "maintenance4"),
+    ] {
+        if available == vk::FALSE {
+            missing.push(format!("the feature {name}"));
+        }
+    }
+}
+
+fn add_missing_formats(instance: &ash::Instance, handle: vk::PhysicalDevice, missing: &mut Vec<String>) {
+    let color = vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::TRANSFER_SRC;
+    let depth = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+    let sampled = vk::FormatFeatureFlags::SAMPLED_IMAGE | vk::FormatFeatureFlags::TRANSFER_DST;
+    for (format, needs, words) in [
+        (vk::Format::R8G8B8A8_UNORM, color, "R8G8B8A8_UNORM as a colour attachment"),
+        (vk::Format::R32_UINT, color, "R32_UINT as a colour attachment"),
+        (vk::Format::D32_SFLOAT, depth, "D32_SFLOAT as a depth attachment"),
+        (vk::Format::R8G8_UINT, sampled, "R8G8_UINT as a sampled image"),
+    ] {
+        // SAFETY: V1.
+        let properties = unsafe { instance.get_physical_device_format_properties(handle, format) };
+        if !properties.optimal_tiling_features.contains(needs) {
+            missing.push(words.to_owned());
+        }
+    }
+}
+
+fn text<E>(words: Result<&CStr, E>) -> String {
+    words.map(|words| words.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// A UUID as people write it: 8-4-4-4-12 hexadecimal digits.
+fn dashed(uuid: &[u8; 16]) -> String {
+    let mut words = String::with_capacity(36);
+    for (index, byte) in uuid.iter().enumerate() {
+        if matches!(index, 4 | 6 | 8 | 10) {
+            words.push('-');
+        }
+        words.push_str(&format!("{byte:02x}"));
+    }
+    words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_uuid_is_written_in_five_dashed_groups() {
+        let uuid = std::array::from_fn(|index| index as u8 * 17);
+        assert_eq!(dashed(&uuid), "00112233-4455-6677-8899-aabbccddeeff");
+    }
+}

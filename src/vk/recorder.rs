@@ -1,0 +1,309 @@
+//! The recorder: the only way to give work to the device.
+//!
+//! A submission is made of writes, passes and reads. Writes take effect before its first pass and reads after its last,
+//! whatever the order of the calls, so they mean the same on devices with and without staging.
+
+use std::any::Any;
+use std::ffi::CStr;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::handle::Owned;
+use super::scope::Scope;
+use super::submit::{allocate_command_buffers, begin_commands, create_command_pool, end_commands, record_barrier};
+use super::timer::Timer;
+use super::transfer::{ReadBacks, ReadTicket, Uploads};
+use super::{Buffer, Device, Image, ImageFormat, PassTime, Timing, call_failed, refused};
+use crate::error::{Error, Result};
+
+/// Records one submission after the other and runs them.
+pub struct Recorder {
+    timer: Option<Timer>,
+    uploads: Uploads,
+    read_backs: ReadBacks,
+    /// What the commands name; alive until the fence.
+    kept: Vec<Arc<dyn Any + Send + Sync>>,
+    upload_commands: vk::CommandBuffer,
+    pass_commands: vk::CommandBuffer,
+    // Owns both command buffers.
+    pool: Owned<vk::CommandPool>,
+    fence: Owned<vk::Fence>,
+    is_recording: bool,
+    submission: u64,
+    last_scope: Scope,
+    last_pass: &'static str,
+    /// A pass that is leaked instead of dropped leaves this set.
+    is_pass_open: bool,
+    stop_query: Option<u32>,
+    label: Vec<u8>,
+    failure: Option<Error>,
+    device: Arc<Device>,
+}
+
+impl Recorder {
+    /// Creates a recorder; its staging buffers come with their first use.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the driver refuses.
+    pub fn create(device: &Arc<Device>, name: &str, timing: Timing) -> Result<Self> {
+        let pool = create_command_pool(device, name)?;
+        let [upload_commands, pass_commands] = allocate_command_buffers(&pool)?;
+        device.set_name(upload_commands, &format!("{name} uploads"));
+        device.set_name(pass_commands, &format!("{name} passes"));
+        // SAFETY: V1.
+        let fence = unsafe { device.raw().create_fence(&vk::FenceCreateInfo::default(), None) }
+            .map_err(|result| call_failed(format!("creation of the fence of {name}"), result))?;
+        Ok(Self {
+            timer: Timer::create(device, timing)?,
+            uploads: Uploads::new(),
+            read_backs: ReadBacks::new(),
+            kept: Vec::new(),
+            upload_commands,
+            pass_commands,
+            pool,
+            fence: Owned::new(device, fence, name),
+            is_recording: false,
+            submission: device.next_submission(),
+            last_scope: Scope::Earlier,
+            last_pass: "none",
+            is_pass_open: false,
+            stop_query: None,
+            label: Vec::new(),
+            failure: None,
+            device: Arc::clone(device),
+        })
+    }
+
+    /// The device that the recorder works on.
+    #[must_use]
+    pub fn device(&self) -> &Arc<Device> {
+        &self.device
+    }
+
+    /// Writes `bytes` at `offset` of the buffer, before the first pass of this submission. Of two writes to the same byte
+    /// the later call wins.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the range is outside the buffer.
+    pub fn write_buffer(&mut self, buffer: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
+        self.begin()?;
+        if buffer.has_host_access() {
+            return buffer.write(offset, bytes);
+        }
+        buffer.check_range("write to", offset, bytes.len() as u64)?;
+        self.uploads.add_buffer(buffer, offset, bytes);
+        Ok(())
+    }
+
+    /// Writes a whole layer of a texture, rows packed tightly, before the first pass of this submission.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the image is no texture, has no such layer, or `bytes` are not those of a layer.
+    pub fn write_image_layer(&mut self, image: &Arc<Image>, layer: u32, bytes: &[u8]) -> Result<()> {
+        self.begin()?;
+        let fits = layer < image.shape().layers && bytes.len() as u64 == image.layer_bytes();
+        if image.format() != ImageFormat::Rg8Uint || !fits {
+            return Err(refused(
+                format!("write to image {}", image.name()),
+                format!("{} bytes for layer {layer} of {:?} {:?}", bytes.len(), image.shape(), image.format()),
+            ));
+        }
+        self.uploads.add_image_layer(image, layer, bytes);
+        Ok(())
+    }
+
+    /// Asks for `size_bytes` at `offset` of the buffer, as they are after the last pass of this submission.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the range is outside the buffer.
+    pub fn read_buffer(&mut self, buffer: &Arc<Buffer>, offset: u64, size_bytes: u64) -> Result<ReadTicket> {
+        self.begin()?;
+        buffer.check_range("read of", offset, size_bytes)?;
+        let (buffer, offset) = self.read_backs.add_buffer(buffer, offset, size_bytes);
+        Ok(ReadTicket { submission: self.submission, buffer, offset, size_bytes })
+    }
+
+    /// Asks for the pixels of a colour attachment, rows packed tightly, as they are after the last pass of this submission.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the image is no colour attachment.
+    pub fn read_image(&mut self, image: &Arc<Image>) -> Result<ReadTicket> {
+        self.begin()?;
+        if !matches!(image.format(), ImageFormat::Rgba8Unorm | ImageFormat::R32Uint) {
+            return Err(refused(
+                format!("read of image {}", image.name()),
+                format!("{:?} is no format of a colour attachment", image.format()),
+            ));
+        }
+        let offset = self.read_backs.add_image(image);
+        let size_bytes = image.layer_bytes();
+        Ok(ReadTicket { submission: self.submission, buffer: None, offset, size_bytes })
+    }
+
+    /// Fetches the bytes of a ticket, after its submission and before anything else is recorded.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the ticket is of another submission, or `bytes` has another size.
+    pub fn read_into(&self, ticket: &ReadTicket, bytes: &mut [u8]) -> Result<()> {
+        if self.is_recording || ticket.submission != self.submission {
+            return Err(refused("read-back", "the ticket is not of the submission that ran last"));
+        }
+        if bytes.len() as u64 != ticket.size_bytes {
+            return Err(refused(
+                "read-back",
+                format!("{} bytes asked for of a ticket for {}", bytes.len(), ticket.size_bytes),
+            ));
+        }
+        match &ticket.buffer {
+            Some(buffer) => buffer.read(ticket.offset, bytes),
+            None => self.read_backs.read(ticket.offset, bytes),
+        }
+    }
+
+    /// Times of the passes of the last submission; empty without [`Timing::On`] or without timestamps.
+    #[must_use]
+    pub fn pass_times(&self) -> &[PassTime] {
+        self.timer.as_ref().map_or(&[], Timer::times)
+    }
+
+    /// Starts a submission unless one is being recorded.
+    pub(super) fn begin(&mut self) -> Result<()> {
+        if self.is_recording {
+            return Ok(());
+        }
+        // SAFETY: V1, V2, V3.
+        unsafe { self.device.raw().reset_command_pool(self.pool.get(), vk::CommandPoolResetFlags::empty()) }
+            .map_err(|result| call_failed("vkResetCommandPool", result))?;
+        begin_commands(&self.device, self.pass_commands)?;
+        self.is_recording = true;
+        self.submission = self.device.next_submission();
+        self.last_scope = Scope::Earlier;
+        self.last_pass = "none";
+        if let Some(timer) = &mut self.timer {
+            timer.record_reset(self.pass_commands);
+        }
+        Ok(())
+    }
+
+    /// Opens a pass: the barrier to what came before, its label and its clock.
+    pub(super) fn begin_pass(&mut self, name: &'static str, scope: Scope) -> Result<()> {
+        self.begin()?;
+        self.require_closed()?;
+        self.record_boundary(scope);
+        self.last_pass = name;
+        self.is_pass_open = true;
+        if let Some(debug_utils) = self.device.debug_utils() {
+            self.label.clear();
+            self.label.extend_from_slice(name.as_bytes());
+            self.label.push(0);
+            let label = CStr::from_bytes_until_nul(&self.label).unwrap_or_default();
+            let label = vk::DebugUtilsLabelEXT::default().label_name(label);
+            // SAFETY: V1, V3.
+            unsafe { debug_utils.cmd_begin_debug_utils_label(self.pass_commands, &label) };
+        }
+        self.stop_query = self.timer.as_mut().and_then(|timer| timer.record_start(self.pass_commands, name));
+        Ok(())
+    }
+
+    /// Closes what `begin_pass` opened.
+    pub(super) fn end_pass(&mut self) {
+        self.is_pass_open = false;
+        if let (Some(timer), Some(query)) = (&self.timer, self.stop_query.take()) {
+            timer.record_stamp(self.pass_commands, query);
+        }
+        if let Some(debug_utils) = self.device.debug_utils() {
+            // SAFETY: V1, V3.
+            unsafe { debug_utils.cmd_end_debug_utils_label(self.pass_commands) };
+        }
+    }
+
+    fn require_closed(&self) -> Result<()> {
+        if self.is_pass_open {
+            return Err(refused(format!("recording of pass {}", self.last_pass), "it was never ended"));
+        }
+        Ok(())
+    }
+
+    /// Records the barrier between the last work and `next`.
+    pub(super) fn record_boundary(&mut self, next: Scope) {
+        record_barrier(&self.device, self.pass_commands, self.last_scope, next);
+        self.last_scope = next;
+    }
+
+    /// The command buffer of the passes.
+    pub(super) fn commands(&self) -> vk::CommandBuffer {
+        self.pass_commands
+    }
+
+    /// Keeps an object that the commands name until they have run.
+    pub(super) fn keep<T: Any + Send + Sync>(&mut self, object: &Arc<T>) {
+        // A pass names the same few things over and over.
+        let recent = self.kept.iter().rev().take(4);
+        let address = Arc::as_ptr(object).cast::<()>();
+        if !recent.map(|kept| Arc::as_ptr(kept).cast::<()>()).any(|kept| std::ptr::eq(kept, address)) {
+            self.kept.push(Arc::<T>::clone(object));
+        }
+    }
+
+    /// Remembers the first error of a recording, to be returned when it is submitted.
+    pub(super) fn fail(&mut self, error: Error) {
+        self.failure.get_or_insert(error);
+    }
+
+    /// Records the writes before and the reads after the passes, and ends the command buffers.
+    pub(super) fn finish_recording(&mut self) -> Result<()> {
+        if let Some(failure) = self.failure.take() {
+            return Err(failure);
+        }
+        self.require_closed()?;
+        if !self.uploads.is_empty() {
+            begin_commands(&self.device, self.upload_commands)?;
+            self.uploads.record(&self.device, self.upload_commands)?;
+            end_commands(&self.device, self.upload_commands)?;
+        }
+        if self.read_backs.has_copies() {
+            self.record_boundary(Scope::Transfer);
+            self.read_backs.record(&self.device, self.pass_commands)?;
+        }
+        if !self.read_backs.is_empty() {
+            self.record_boundary(Scope::HostRead);
+        }
+        end_commands(&self.device, self.pass_commands)
+    }
+
+    /// Forgets the submission; its results stay readable. Nothing may be in flight.
+    pub(super) fn clear(&mut self) {
+        self.is_recording = false;
+        self.is_pass_open = false;
+        self.failure = None;
+        self.uploads.clear();
+        self.read_backs.clear();
+        self.kept.clear();
+    }
+
+    pub(super) fn collect_times(&mut self) -> Result<()> {
+        self.timer.as_mut().map_or(Ok(()), Timer::collect)
+    }
+
+    pub(super) fn is_recording(&self) -> bool {
+        self.is_recording
+    }
+
+    pub(super) fn has_uploads(&self) -> bool {
+        !self.uploads.is_empty()
+    }
+
+    /// The command buffers of the writes and of the passes.
+    pub(super) fn command_buffers(&self) -> (vk::CommandBuffer, vk::CommandBuffer) {
+        (self.upload_commands, self.pass_commands)
+    }
+
+    pub(super) fn fence(&self) -> vk::Fence {
+        self.fence.get()
+    }
+
+    pub(super) fn last_pass(&self) -> &'static str {
+        self.last_pass
+    }
+}
