@@ -10,6 +10,7 @@ pub mod cpu;
 pub mod engine;
 pub mod error;
 pub mod evolve;
+pub mod gpu;
 pub mod model;
 pub mod output;
 pub mod photo;

@@ -203,8 +203,11 @@ fn create_raw(
     if physical::has_extension(instance.raw(), physical, PORTABILITY_SUBSET)? {
         extensions.push(PORTABILITY_SUBSET.as_ptr());
     }
-    let mut features =
-        vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true).maintenance4(true);
+    let mut features = vk::PhysicalDeviceVulkan13Features::default()
+        .synchronization2(true)
+        .dynamic_rendering(true)
+        .maintenance4(true)
+        .shader_demote_to_helper_invocation(true);
     let create_info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)

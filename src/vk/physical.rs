@@ -29,6 +29,8 @@ pub enum DeviceKind {
 pub struct DeviceLimits {
     /// Largest storage buffer that a shader can see, in bytes.
     pub storage_buffer_bytes: u64,
+    /// Most storage buffers that one shader stage sees.
+    pub storage_buffers_per_stage: u32,
     /// Most workgroups of one dispatch along x, y and z.
     pub workgroups: [u32; 3],
     /// Most invocations of one workgroup.
@@ -174,6 +176,7 @@ fn kind_of(device_type: vk::PhysicalDeviceType) -> DeviceKind {
 fn limits_of(limits: &vk::PhysicalDeviceLimits, timestamp_bits: u32) -> DeviceLimits {
     DeviceLimits {
         storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+        storage_buffers_per_stage: limits.max_per_stage_descriptor_storage_buffers,
         workgroups: limits.max_compute_work_group_count,
         workgroup_invocations: limits.max_compute_work_group_invocations,
         shared_memory_bytes: limits.max_compute_shared_memory_size,
@@ -234,6 +237,8 @@ fn add_missing_features(instance: &ash::Instance, handle: vk::PhysicalDevice, mi
         (vulkan13.synchronization2, "synchronization2"),
         (vulkan13.dynamic_rendering, "dynamicRendering"),
         (vulkan13.maintenance4, "maintenance4"),
+        // What `discard` compiles to.
+        (vulkan13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
     ] {
         if available == vk::FALSE {
             missing.push(format!("the feature {name}"));

@@ -1,10 +1,16 @@
 //! The evaluators equal brute force, with `==`.
 
+use std::sync::Arc;
+
 use smalti::cpu::CpuEvaluator;
+use smalti::gpu::{GpuEvaluator, KernelShape};
 use smalti::model::{Canvas, Change, Evaluator, Fly, NO_FLY, Population, Scene};
 
+use smalti::vk::{DeviceOptions, Staging};
+
+use crate::canary;
 use crate::reference::Reference;
-use crate::scenarios::{Scenario, any_fly, random_scene, scenarios, stream};
+use crate::scenarios::{Scenario, any_fly, holed_masks, random_scene, scenarios, stream};
 
 /// Flies whose marginal fitness is also checked by leaving them out of a whole picture.
 const RE_RENDERS: usize = 500;
@@ -47,6 +53,34 @@ fn on_the_cpu_fitness_layers_and_mosaic_equal_brute_force() {
     }
 }
 
+#[test]
+fn on_vulkan_fitness_layers_and_mosaic_equal_brute_force() {
+    for scenario in scenarios() {
+        canary::with_device(&DeviceOptions::default(), |device| {
+            let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
+            check_scenario(&mut evaluator, &scenario);
+            let drawn = evaluator.draw_fly_layer(&population(&scenario.scene, &scenario.flies)).expect("it draws");
+            let layers = evaluator.read_back_layers(0).expect("the evaluator works");
+            assert_eq!(drawn, layers.top, "{}: the graphics pass and the compute pass differ", scenario.name);
+        });
+    }
+}
+
+#[test]
+fn every_kernel_shape_gives_the_same_numbers_directly_and_through_staging() {
+    for (block_side_px, pixels_per_thread) in [(8, 1), (8, 4), (16, 4), (16, 8), (32, 4)] {
+        let options = DeviceOptions { staging: Staging::Forced, ..DeviceOptions::default() };
+        canary::with_device(&options, |device| {
+            let shape = KernelShape { block_side_px, pixels_per_thread };
+            for scenario in scenarios().iter().filter(|scenario| scenario.flies.len() <= 300) {
+                let scenes = vec![scenario.scene.clone()];
+                let mut evaluator = GpuEvaluator::create_with_shape(&device, scenes, shape).expect("it fits");
+                check_scenario(&mut evaluator, scenario);
+            }
+        });
+    }
+}
+
 /// 10,000 births, in batches of 1 to 100, then the same population loaded afresh.
 fn check_incremental(evaluator: &mut dyn Evaluator) {
     let mut random = stream(7);
@@ -58,7 +92,7 @@ fn check_incremental(evaluator: &mut dyn Evaluator) {
         let count = 1 + random.below(100).min(9_999 - births);
         let change = |_| {
             let index = random.below(scene.fly_count as u32);
-            let fly = if index % 17 == 0 { Fly::ABSENT } else { any_fly(&scene, 0.25..15.0, &mut random) };
+            let fly = if index.is_multiple_of(17) { Fly::ABSENT } else { any_fly(&scene, 0.25..15.0, &mut random) };
             flies[index as usize] = fly;
             Change { lane: 0, index, fly }
         };
@@ -76,7 +110,72 @@ fn check_incremental(evaluator: &mut dyn Evaluator) {
     assert!(layers.top.iter().any(|&fly| fly != NO_FLY));
 }
 
+fn incremental_scene() -> Scene {
+    Scene { masks: Arc::new(holed_masks()), ..random_scene(120, 90, 400, &mut stream(3)) }
+}
+
 #[test]
 fn on_the_cpu_the_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
-    check_incremental(&mut CpuEvaluator::new(vec![random_scene(120, 90, 400, &mut stream(3))]));
+    check_incremental(&mut CpuEvaluator::new(vec![incremental_scene()]));
+}
+
+#[test]
+fn on_vulkan_the_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_incremental(&mut GpuEvaluator::create(&device, vec![incremental_scene()]).expect("it fits"));
+    });
+}
+
+/// Loads and changes three lanes together, and each alone; all fitness must agree.
+fn check_lanes(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
+    let mut random = stream(11);
+    let masked = Scene { masks: Arc::new(holed_masks()), ..random_scene(70, 20, 90, &mut random) };
+    let scenes = vec![random_scene(33, 65, 120, &mut random), masked, random_scene(8, 8, 7, &mut random)];
+    let populations: Vec<Vec<Fly>> = scenes
+        .iter()
+        .map(|scene| (0..scene.fly_count).map(|_| any_fly(scene, 1.0..20.0, &mut random)).collect())
+        .collect();
+    let change = |lane: usize, random: &mut _| {
+        let index = scenes[lane].fly_count as u32 / 2;
+        Change { lane, index, fly: any_fly(&scenes[lane], 1.0..20.0, random) }
+    };
+    let changes: Vec<Change> = (0..3).map(|lane| change(lane, &mut random)).collect();
+
+    let mut together = create(scenes.clone());
+    let loads: Vec<(usize, &[Fly])> = populations.iter().map(Vec::as_slice).enumerate().collect();
+    together.load(&loads).expect("the evaluator works");
+    together.replace(&changes).expect("the evaluator works");
+    for (lane, scene) in scenes.iter().enumerate() {
+        let mut alone = create(vec![scene.clone()]);
+        alone.load(&[(0, &populations[lane])]).expect("the evaluator works");
+        alone.replace(&[Change { lane: 0, ..changes[lane] }]).expect("the evaluator works");
+        assert_eq!(together.evaluation(lane), alone.evaluation(0), "lane {lane}");
+        let layers = together.read_back_layers(lane).expect("the evaluator works");
+        assert_eq!(layers, alone.read_back_layers(0).expect("the evaluator works"), "lane {lane}");
+    }
+}
+
+#[test]
+fn on_the_cpu_three_lanes_of_different_sizes_equal_three_single_ones() {
+    check_lanes(|scenes| Box::new(CpuEvaluator::new(scenes)));
+}
+
+#[test]
+fn on_vulkan_three_lanes_of_different_sizes_equal_three_single_ones() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_lanes(|scenes| Box::new(GpuEvaluator::create(&device, scenes).expect("it fits")));
+    });
+}
+
+#[test]
+fn re_rendering_without_each_fly_gives_the_marginal_fitness_of_the_one_dispatch() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        let scene = incremental_scene();
+        let mut random = stream(5);
+        let flies: Vec<Fly> = (0..scene.fly_count).map(|_| any_fly(&scene, 1.0..15.0, &mut random)).collect();
+        let mut evaluator = GpuEvaluator::create(&device, vec![scene]).expect("it fits");
+        evaluator.load(&[(0, &flies)]).expect("the evaluator works");
+        let slow = evaluator.marginal_by_re_rendering().expect("it fits a dispatch");
+        assert_eq!(slow, evaluator.evaluation(0).marginal);
+    });
 }

@@ -1,0 +1,273 @@
+//! The compute pass `evaluate`: its pipeline, and the buffers that all lanes share. Twin: `cpu/evaluate.rs`.
+
+use std::sync::Arc;
+
+use super::layout::{EvaluatePush, INSIDE, LaneRecord, Tile, WorkItem};
+use super::shaders;
+use crate::error::{Error, Result};
+use crate::model::mask::MASK_SIDE;
+use crate::model::tile::pack;
+use crate::model::{Lane, MaskSet};
+use crate::vk::{
+    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePass, ComputePipeline, ComputeShader, Device,
+    DeviceKind, Image, ImageFormat, ImageShape, Recorder, Residence,
+};
+
+/// Most tiles that one dispatch looks at in a block. Software Vulkan ends a loop silently after 65,535 turns (Mesa
+/// 22.3.6, llvmpipe); longer lists are continued by the next dispatch.
+pub(super) const LIST_PIECE: usize = 16_384;
+
+/// How the work of a block is cut; it never changes a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KernelShape {
+    /// Pixels along each side of a block.
+    pub block_side_px: u32,
+    /// Pixels of one column that an invocation works on; divides the side.
+    pub pixels_per_thread: u32,
+}
+
+impl KernelShape {
+    /// The shape for a class of devices: on software Vulkan the fastest of `cargo bench --bench kernel_shape`; for
+    /// hardware, one that fills a warp or a wave.
+    #[must_use]
+    pub fn for_device(kind: DeviceKind) -> Self {
+        match kind {
+            DeviceKind::Cpu => Self { block_side_px: 8, pixels_per_thread: 8 },
+            _ => Self { block_side_px: 16, pixels_per_thread: 4 },
+        }
+    }
+
+    /// Pixels of a block.
+    #[must_use]
+    pub fn block_pixels(self) -> usize {
+        (self.block_side_px * self.block_side_px) as usize
+    }
+
+    fn specialization(self, mode: Mode) -> [(u32, u32); 4] {
+        let threads = self.block_side_px * self.block_side_px / self.pixels_per_thread;
+        [(0, threads), (1, self.block_side_px), (2, self.pixels_per_thread), (3, mode as u32)]
+    }
+}
+
+/// What the kernel computes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// Layers, marginal fitness, SAE.
+    Evaluate = 0,
+    /// Only the SAE, with one fly left out.
+    ReRender = 1,
+}
+
+/// Where a lane lies in the shared buffers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LaneSpan {
+    pub first_fly: usize,
+    pub fly_count: usize,
+    pub first_pixel: usize,
+    pub pixel_count: usize,
+}
+
+/// Pipeline and buffers of the pass.
+pub(super) struct EvaluatePass {
+    pub shape: KernelShape,
+    pub spans: Vec<LaneSpan>,
+    pub tiles: Arc<Buffer>,
+    pub top: Arc<Buffer>,
+    pub under: Arc<Buffer>,
+    pub marginal: Arc<Buffer>,
+    pub sums: Arc<Buffer>,
+    lanes: Arc<Buffer>,
+    work: Arc<Buffer>,
+    entries: Arc<Buffer>,
+    targets: Arc<Buffer>,
+    parts: Arc<Buffer>,
+    masks: Arc<Image>,
+    pipeline: Arc<ComputePipeline>,
+    group: Arc<BindingGroup>,
+    workgroups_per_row: u32,
+}
+
+impl EvaluatePass {
+    /// Creates the buffers for these lanes and uploads what never changes: lane records, targets and masks.
+    pub fn create(device: &Arc<Device>, recorder: &mut Recorder, lanes: &[Lane], shape: KernelShape) -> Result<Self> {
+        let spans = spans(lanes, shape);
+        let fly_count: usize = spans.iter().map(|span| span.fly_count).sum();
+        let pixel_count: usize = spans.iter().map(|span| span.pixel_count).sum();
+        if u32::try_from(pixel_count).is_err() {
+            return Err(Error::TooLarge(format!(
+                "{pixel_count} pixels are more than one Vulkan device evaluates at once; use a smaller --size, or --device cpu"
+            )));
+        }
+        let block_count = pixel_count / shape.block_pixels();
+        // Room for the lists of a whole population of ordinary depth; longer work takes several submissions.
+        let entry_count = (16 * fly_count + 8 * block_count).clamp(1 << 16, 1 << 22);
+        let storage = |name: &str, bytes: usize| {
+            Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
+        };
+        let masks = create_masks(device, recorder, lanes.iter().map(|lane| &*lane.scene().masks))?;
+        let pipeline = create_pipeline(device, shape, Mode::Evaluate)?;
+        let buffers = [
+            storage("lanes", lanes.len() * size_of::<LaneRecord>())?,
+            storage("work", block_count * size_of::<WorkItem>())?,
+            storage("entries", entry_count * 4)?,
+            storage("tiles", fly_count * size_of::<Tile>())?,
+            storage("targets", pixel_count * 4)?,
+            storage("top layer", pixel_count * 4)?,
+            storage("under layer", pixel_count * 4)?,
+            storage("parts", pixel_count * 4)?,
+            storage("marginal fitness", fly_count * 8)?,
+            storage("sums", lanes.len() * 8)?,
+        ];
+        let group = bind(&pipeline, &buffers, &masks)?;
+        let [lane_records, work, entries, tiles, targets, top, under, parts, marginal, sums] = buffers;
+        upload_lanes(recorder, &lane_records, lanes, &spans)?;
+        for (lane, span) in lanes.iter().zip(&spans) {
+            recorder.write_buffer(
+                &targets,
+                span.first_pixel as u64 * 4,
+                bytemuck::cast_slice(&blocked(lane, shape)),
+            )?;
+        }
+        Ok(Self {
+            shape,
+            spans,
+            tiles,
+            top,
+            under,
+            marginal,
+            sums,
+            lanes: lane_records,
+            work,
+            entries,
+            targets,
+            parts,
+            masks,
+            pipeline,
+            group,
+            workgroups_per_row: device.info().limits.workgroups[0],
+        })
+    }
+
+    /// Work items that fit one dispatch.
+    pub fn item_capacity(&self) -> usize {
+        self.work.size_bytes() as usize / size_of::<WorkItem>()
+    }
+
+    /// List entries that fit one dispatch.
+    pub fn entry_capacity(&self) -> usize {
+        self.entries.size_bytes() as usize / 4
+    }
+
+    /// Uploads work items and their lists for the next dispatch.
+    pub fn write_work(&self, recorder: &mut Recorder, items: &[WorkItem], entries: &[u32]) -> Result<()> {
+        recorder.write_buffer(&self.work, 0, bytemuck::cast_slice(items))?;
+        recorder.write_buffer(&self.entries, 0, bytemuck::cast_slice(entries))
+    }
+
+    /// Records the dispatch of `item_count` work items.
+    pub fn record(&self, recorder: &mut Recorder, item_count: usize) -> Result<()> {
+        let mut pass = recorder.compute_pass("evaluate")?;
+        let push = EvaluatePush { item_count: item_count as u32, left_out_fly: u32::MAX, sum_offset: 0 };
+        self.dispatch(&mut pass, &self.pipeline, &self.group, push);
+        Ok(())
+    }
+
+    /// Dispatches one workgroup per work item with any kernel that has this pass's bindings.
+    pub fn dispatch(
+        &self,
+        pass: &mut ComputePass<'_>,
+        pipeline: &Arc<ComputePipeline>,
+        group: &Arc<BindingGroup>,
+        push: EvaluatePush,
+    ) {
+        pass.bind(pipeline, group);
+        pass.push_constants(bytemuck::bytes_of(&push));
+        let columns = push.item_count.min(self.workgroups_per_row);
+        pass.dispatch(columns, push.item_count.div_ceil(columns), 1);
+    }
+
+    /// This pass's bindings with other sums.
+    pub fn bind_with_sums(&self, pipeline: &ComputePipeline, sums: &Arc<Buffer>) -> Result<Arc<BindingGroup>> {
+        let Self { lanes, work, entries, tiles, targets, top, under, parts, marginal, masks, .. } = self;
+        let buffers = [lanes, work, entries, tiles, targets, top, under, parts, marginal, sums].map(Arc::clone);
+        bind(pipeline, &buffers, masks)
+    }
+}
+
+/// The kernel in one of its modes.
+pub(super) fn create_pipeline(device: &Arc<Device>, shape: KernelShape, mode: Mode) -> Result<Arc<ComputePipeline>> {
+    let mut bindings = [BindingKind::StorageBuffer; 11];
+    bindings[10] = BindingKind::SampledImage;
+    ComputePipeline::create(
+        device,
+        &ComputeShader {
+            name: "evaluate",
+            spirv: &shaders::words(shaders::EVALUATE),
+            specialization: &shape.specialization(mode),
+            bindings: &bindings,
+            push_constant_bytes: size_of::<EvaluatePush>() as u32,
+        },
+    )
+}
+
+/// All layers of all mask sets, one set after the other, as a texture array.
+pub(super) fn create_masks<'a>(
+    device: &Arc<Device>,
+    recorder: &mut Recorder,
+    sets: impl Iterator<Item = &'a MaskSet> + Clone,
+) -> Result<Arc<Image>> {
+    let side = MASK_SIDE as u32;
+    let layers = sets.clone().map(|set| set.layers().len() as u32).sum();
+    let shape = ImageShape { width_px: side, height_px: side, layers };
+    let image = Image::create(device, "masks", ImageFormat::Rg8Uint, shape)?;
+    for (layer, mask) in (0..).zip(sets.flat_map(MaskSet::layers)) {
+        recorder.write_image_layer(&image, layer, bytemuck::cast_slice(mask.texels()))?;
+    }
+    Ok(image)
+}
+
+fn bind(pipeline: &ComputePipeline, buffers: &[Arc<Buffer>; 10], masks: &Arc<Image>) -> Result<Arc<BindingGroup>> {
+    let mut bindings: Vec<Binding<'_>> = buffers.iter().map(Binding::Buffer).collect();
+    bindings.push(Binding::SampledImage(masks));
+    BindingGroup::create("evaluate", pipeline.layout(), &bindings)
+}
+
+fn spans(lanes: &[Lane], shape: KernelShape) -> Vec<LaneSpan> {
+    let (mut first_fly, mut first_pixel) = (0, 0);
+    let span = |lane: &Lane| {
+        let (fly_count, pixel_count) = (lane.tiles().len(), lane.lists().block_count() * shape.block_pixels());
+        let span = LaneSpan { first_fly, fly_count, first_pixel, pixel_count };
+        first_fly += fly_count;
+        first_pixel += pixel_count;
+        span
+    };
+    lanes.iter().map(span).collect()
+}
+
+fn upload_lanes(recorder: &mut Recorder, buffer: &Arc<Buffer>, lanes: &[Lane], spans: &[LaneSpan]) -> Result<()> {
+    let mut first_mask = 0;
+    let record = |(sum, (lane, span)): (u32, (&Lane, &LaneSpan))| {
+        let background = pack(lane.scene().background);
+        let record = LaneRecord { first_fly: span.first_fly as u32, first_mask, background, sum };
+        first_mask += lane.scene().masks.layers().len() as u32;
+        record
+    };
+    let records: Vec<LaneRecord> = (0..).zip(lanes.iter().zip(spans)).map(record).collect();
+    recorder.write_buffer(buffer, 0, bytemuck::cast_slice(&records))
+}
+
+/// The lane's target block by block, packed, with [`INSIDE`]; pixels beyond the picture's edge are 0.
+fn blocked(lane: &Lane, shape: KernelShape) -> Vec<u32> {
+    let (target, lists) = (&lane.scene().target, lane.lists());
+    let (width, height, side) = (target.width_px(), target.height_px(), shape.block_side_px);
+    let mut words = vec![0; lists.block_count() * shape.block_pixels()];
+    for (number, block) in words.chunks_exact_mut(shape.block_pixels()).enumerate() {
+        let (x, y) = lists.origin(number);
+        for (row, places) in (y..height).zip(block.chunks_exact_mut(side as usize)) {
+            let first = row as usize * width as usize + x as usize;
+            let pixels = &target.pixels()[first..][..side.min(width - x) as usize];
+            places.iter_mut().zip(pixels).for_each(|(place, &color)| *place = pack(color) | INSIDE);
+        }
+    }
+    words
+}

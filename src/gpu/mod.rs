@@ -1,0 +1,13 @@
+//! The passes on top of `vk`: evaluation and drawing of flies on a Vulkan device.
+//!
+//! Each pass has a shader of the same stem in `glsl/` and a twin of the same stem in `cpu/`, and gives the same bits.
+
+mod evaluate_pass;
+mod evaluator;
+pub mod layout;
+mod mosaic_pass;
+mod re_render;
+mod shaders;
+
+pub use evaluate_pass::KernelShape;
+pub use evaluator::GpuEvaluator;

@@ -1,0 +1,203 @@
+//! The graphics pass `mosaic`: instanced quads with a transform and a mask each, drawn patch by patch into colour, fly
+//! and depth. Twin: `cpu/mosaic.rs`.
+
+use std::sync::Arc;
+
+use glam::{DAffine2, DMat2, DVec2};
+
+use super::evaluate_pass::create_masks;
+use super::layout::{Instance, MosaicPush, Tile};
+use super::shaders;
+use crate::error::Result;
+use crate::model::blocks::{BlockLists, index_of};
+use crate::model::{Canvas, Fly, Mosaic, NO_FLY, Patch, Population};
+use crate::vk::{
+    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, DepthTest, Device,
+    GraphicsPipeline, GraphicsShaders, Image, ImageFormat, ImageShape, Recorder, RenderTargets, Residence,
+};
+
+/// Samples along each side of a patch: three attachments of 16 MiB, whatever the size of the canvas.
+const PATCH_SIDE: u32 = 2048;
+
+/// Pipeline, attachments and tiles of one population on one canvas of samples.
+pub(super) struct MosaicPass {
+    samples: Canvas,
+    background: [u8; 3],
+    tiles: Vec<Tile>,
+    ranks: Vec<u32>,
+    flies: Vec<Fly>,
+    instances: Arc<Buffer>,
+    pipeline: Arc<GraphicsPipeline>,
+    group: Arc<BindingGroup>,
+    color: Arc<Image>,
+    fly: Arc<Image>,
+    depth: Arc<Image>,
+}
+
+impl MosaicPass {
+    /// Bakes and uploads `population` for a canvas of samples.
+    pub fn create(
+        device: &Arc<Device>,
+        recorder: &mut Recorder,
+        population: &Population,
+        samples: &Canvas,
+    ) -> Result<Self> {
+        let tiles: Vec<Tile> = population.flies.iter().map(|fly| Tile::bake(fly, samples)).collect();
+        let storage = |name: &str, bytes: usize| {
+            Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
+        };
+        let tile_buffer = storage("mosaic tiles", tiles.len() * size_of::<Tile>())?;
+        recorder.write_buffer(&tile_buffer, 0, bytemuck::cast_slice(&tiles))?;
+        let instances = storage("mosaic instances", tiles.len() * size_of::<Instance>())?;
+        let masks = create_masks(device, recorder, std::iter::once(&population.masks))?;
+        let pipeline = create_pipeline(device)?;
+        let bindings = [Binding::Buffer(&tile_buffer), Binding::Buffer(&instances), Binding::SampledImage(&masks)];
+        let side = PATCH_SIDE.min(device.info().limits.image_side_px);
+        let shape =
+            ImageShape { width_px: side.min(samples.width_px), height_px: side.min(samples.height_px), layers: 1 };
+        let group = BindingGroup::create("mosaic", pipeline.layout(), &bindings)?;
+        Ok(Self {
+            samples: *samples,
+            background: population.background,
+            ranks: ranks(population),
+            flies: population.flies.clone(),
+            tiles,
+            instances,
+            group,
+            pipeline,
+            color: Image::create(device, "mosaic colour", ImageFormat::Rgba8Unorm, shape)?,
+            fly: Image::create(device, "mosaic fly", ImageFormat::R32Uint, shape)?,
+            depth: Image::create(device, "mosaic depth", ImageFormat::D32Float, shape)?,
+        })
+    }
+
+    /// Draws on `canvas`, each pixel the mean of `supersampling`² samples.
+    pub fn draw(&self, recorder: &mut Recorder, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
+        let mut mosaic = Mosaic::new(canvas);
+        let color = Arc::clone(&self.color);
+        self.draw_patches(recorder, supersampling, &color, |patch, samples| {
+            mosaic.absorb(patch, samples, supersampling);
+        })?;
+        Ok(mosaic)
+    }
+
+    /// The fly that shows at each sample, row by row.
+    pub fn draw_fly_layer(&self, recorder: &mut Recorder) -> Result<Vec<u32>> {
+        let width = self.samples.width_px as usize;
+        let mut layer = vec![NO_FLY; width * self.samples.height_px as usize];
+        let fly = Arc::clone(&self.fly);
+        self.draw_patches(recorder, 1, &fly, |patch, flies| {
+            for (row, flies) in flies.chunks_exact(patch.width_px as usize).enumerate() {
+                let first = (patch.y as usize + row) * width + patch.x as usize;
+                layer[first..first + flies.len()].copy_from_slice(flies);
+            }
+        })?;
+        Ok(layer)
+    }
+
+    /// Draws every patch and hands the rows of `attachment` to `take`. Patches start at multiples of `grain`.
+    fn draw_patches(
+        &self,
+        recorder: &mut Recorder,
+        grain: u32,
+        attachment: &Arc<Image>,
+        mut take: impl FnMut(&Patch, &[u32]),
+    ) -> Result<()> {
+        let shape = self.color.shape();
+        let side = shape.width_px.max(shape.height_px) / grain * grain;
+        let mut lists = BlockLists::new(&self.samples, side);
+        lists.fill(&self.flies, &self.tiles);
+        let mut pixels = vec![0_u32; shape.width_px as usize * shape.height_px as usize];
+        for number in 0..lists.block_count() {
+            let (x, y) = lists.origin(number);
+            let (width_px, height_px) = (side.min(self.samples.width_px - x), side.min(self.samples.height_px - y));
+            let patch = Patch { x, y, width_px, height_px };
+            self.record(recorder, &patch, lists.list(number))?;
+            let ticket = recorder.read_image(attachment)?;
+            recorder.submit_and_wait()?;
+            recorder.read_into(&ticket, bytemuck::cast_slice_mut(&mut pixels))?;
+            let rows = pixels.chunks_exact(shape.width_px as usize).take(height_px as usize);
+            let packed: Vec<u32> = rows.flat_map(|row| &row[..width_px as usize]).copied().collect();
+            take(&patch, &packed);
+        }
+        Ok(())
+    }
+
+    /// Records the drawing of one patch, nearest tiles first.
+    fn record(&self, recorder: &mut Recorder, patch: &Patch, list: &[u64]) -> Result<()> {
+        let instances: Vec<Instance> = list.iter().map(|&key| self.instance(index_of(key))).collect();
+        recorder.write_buffer(&self.instances, 0, bytemuck::cast_slice(&instances))?;
+        let [r, g, b] = self.background.map(|channel| f32::from(channel) / 255.0);
+        let targets = RenderTargets {
+            colors: &[
+                ColorTarget { image: &self.color, clear: ClearColor::Float([r, g, b, 1.0]) },
+                ColorTarget { image: &self.fly, clear: ClearColor::Uint([NO_FLY; 4]) },
+            ],
+            depth: Some(&self.depth),
+            width_px: patch.width_px,
+            height_px: patch.height_px,
+        };
+        let mut pass = recorder.render_pass("mosaic", &targets)?;
+        pass.bind(&self.pipeline, &self.group);
+        pass.push_constants(bytemuck::bytes_of(&MosaicPush {
+            origin: [patch.x as i32, patch.y as i32],
+            pixel_size: [2.0 / patch.width_px as f32, 2.0 / patch.height_px as f32],
+            first_mask: 0,
+        }));
+        pass.draw(4, instances.len() as u32);
+        Ok(())
+    }
+
+    fn instance(&self, fly: u32) -> Instance {
+        let quad = quad_transform(&self.tiles[fly as usize]);
+        Instance {
+            axis_u: quad.matrix2.x_axis.as_vec2().to_array(),
+            axis_v: quad.matrix2.y_axis.as_vec2().to_array(),
+            centre: quad.translation.as_vec2().to_array(),
+            fly,
+            rank: self.ranks[fly as usize],
+        }
+    }
+}
+
+/// The transform from the square [-1, 1]² to a quad, in px of the canvas, that holds the tile and a pixel around it.
+///
+/// It inverts the tile's integer map, so its error is that of f64, far below the extra pixel.
+fn quad_transform(tile: &Tile) -> DAffine2 {
+    let (cos, sin) = (f64::from(tile.cos), f64::from(tile.sin));
+    // (u, v) = scale * rotation^-1 * (i, j); the inverse has the axes (cos, sin) and (-sin, cos) over scale².
+    let rotation = DMat2::from_cols(DVec2::new(cos, sin), DVec2::new(-sin, cos));
+    let to_px = rotation * rotation.determinant().recip();
+    let scale = rotation.determinant().sqrt();
+    let half = DVec2::new(f64::from(tile.u_end()), f64::from(tile.v_end())) / 2.0;
+    let corner = DVec2::new(f64::from(tile.x0), f64::from(tile.y0));
+    let centre = corner + to_px * (half - DVec2::new(f64::from(tile.u0), f64::from(tile.v0)));
+    DAffine2::from_mat2_translation(to_px * DMat2::from_diagonal(half + DVec2::splat(scale)), centre)
+}
+
+/// Per fly its place in the depth order.
+fn ranks(population: &Population) -> Vec<u32> {
+    let mut keys: Vec<u64> = (0..).zip(&population.flies).map(|(index, fly)| fly.depth_key(index)).collect();
+    keys.sort_unstable();
+    let mut ranks = vec![0; keys.len()];
+    for (rank, key) in (0..).zip(keys) {
+        ranks[index_of(key) as usize] = rank;
+    }
+    ranks
+}
+
+fn create_pipeline(device: &Arc<Device>) -> Result<Arc<GraphicsPipeline>> {
+    GraphicsPipeline::create(
+        device,
+        &GraphicsShaders {
+            name: "mosaic",
+            vertex: &shaders::words(shaders::MOSAIC_VERTEX),
+            fragment: &shaders::words(shaders::MOSAIC_FRAGMENT),
+            specialization: &[],
+            bindings: &[BindingKind::StorageBuffer, BindingKind::StorageBuffer, BindingKind::SampledImage],
+            push_constant_bytes: size_of::<MosaicPush>() as u32,
+            colors: &[ImageFormat::Rgba8Unorm, ImageFormat::R32Uint],
+            depth: DepthTest::Less,
+        },
+    )
+}

@@ -1,0 +1,13 @@
+//! The compiled shaders, one module per stage, as committed in `spirv/`.
+
+/// Twin: `cpu/evaluate.rs`.
+pub(super) const EVALUATE: &[u8] = include_bytes!("../../spirv/evaluate.comp.spv");
+/// Twin: `cpu/mosaic.rs`.
+pub(super) const MOSAIC_VERTEX: &[u8] = include_bytes!("../../spirv/mosaic.vert.spv");
+/// Twin: `cpu/mosaic.rs`.
+pub(super) const MOSAIC_FRAGMENT: &[u8] = include_bytes!("../../spirv/mosaic.frag.spv");
+
+/// A module as the words that Vulkan reads; the bytes in the binary may lie at any address.
+pub(super) fn words(module: &[u8]) -> Vec<u32> {
+    bytemuck::pod_collect_to_vec(module)
+}
