@@ -57,6 +57,9 @@ fn one_sentence(message: &str) -> String {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Evolve one picture into a mosaic
+    ///
+    /// Thousands of coloured tiles are bred, one death and one birth at a time, until together they look like the
+    /// picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
@@ -70,10 +73,6 @@ Examples:
   smalti evolve photo.jpg -o better.png --init flies.npz --seed 1
   smalti evolve photo.jpg -o - --quiet > mosaic.png";
 
-/// Evolves one picture into a mosaic: thousands of coloured tiles whose places, sizes, angles, depths and colours are
-/// bred, one death and one birth at a time, until together they look like the picture.
-///
-/// The same picture, options and seed give the same bytes on every device.
 #[derive(Debug, Args)]
 #[command(after_help = EVOLVE_EXAMPLES)]
 pub(super) struct EvolveArgs {

@@ -54,12 +54,16 @@ impl Job {
         })
     }
 
+    /// The tile shapes that the flies may wear.
+    pub(super) fn masks(&self) -> MaskSet {
+        self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone())
+    }
+
     /// The lane that the job becomes.
     pub(super) fn scene(&self) -> Scene {
-        let masks = self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone());
         Scene {
             target: Arc::clone(&self.target),
-            masks: Arc::new(masks),
+            masks: Arc::new(self.masks()),
             background: self.background,
             fly_count: self.fly_count,
         }

@@ -23,6 +23,10 @@ pub(super) fn estimate_bytes(pixel_count: u64, fly_count: usize, output_pixel_co
 /// [`Error::TooLarge`].
 pub(super) fn check(needed_bytes: u64) -> Result<()> {
     let available_bytes = std::fs::read_to_string("/proc/meminfo").ok().and_then(|told| available_bytes(&told));
+    check_against(needed_bytes, available_bytes)
+}
+
+fn check_against(needed_bytes: u64, available_bytes: Option<u64>) -> Result<()> {
     match available_bytes {
         Some(available_bytes) if needed_bytes > available_bytes => Err(Error::TooLarge(format!(
             "this needs about {} MiB of memory and {} MiB are free; use a smaller --size or --output-size, or fewer --tiles",
@@ -48,6 +52,14 @@ mod tests {
         let meminfo = "MemTotal:       24689124 kB\nMemFree:  1 kB\nMemAvailable:   23000000 kB\nBuffers: 2 kB\n";
         assert_eq!(available_bytes(meminfo), Some(23_000_000 * 1024));
         assert_eq!(available_bytes("MemTotal: 1 kB\n"), None);
+    }
+
+    #[test]
+    fn more_than_the_free_memory_is_refused_with_both_numbers() {
+        assert!(check_against(1 << 30, Some(1 << 30)).is_ok());
+        assert!(check_against(1 << 60, None).is_ok());
+        let refusal = check_against(3 << 30, Some(1 << 30)).expect_err("there is not enough").to_string();
+        assert!(refusal.contains("3072 MiB") && refusal.contains("1024 MiB"), "{refusal}");
     }
 
     #[test]

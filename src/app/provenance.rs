@@ -12,7 +12,7 @@ use super::options::EvolveOptions;
 use super::report::Status;
 use crate::archive;
 use crate::error::Result;
-use crate::evolve::{ALGORITHM_VERSION, OnDry, Outcome, StopReason};
+use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
 use crate::model::Population;
 use crate::photo::{self, Metadata};
 
@@ -39,6 +39,15 @@ pub(super) struct Ending {
     pub outcome: Outcome,
 }
 
+impl Ending {
+    /// How `evolution`, which has ended, ended.
+    pub(super) fn of(evolution: &Evolution) -> Self {
+        let stop = evolution.stop_reason().unwrap_or(StopReason::Births);
+        let status = if stop == StopReason::Interrupted { Status::Partial } else { Status::Complete };
+        Self { status, stop, sae: evolution.best_sae().unwrap_or_default(), outcome: evolution.outcome() }
+    }
+}
+
 impl Provenance {
     /// What decides a mosaic.
     pub(super) fn of_mosaic(options: &EvolveOptions, job: &Job) -> Self {
@@ -56,11 +65,7 @@ impl Provenance {
                 "batch_births": scheme.batch_births,
                 "restarts": scheme.restarts,
                 "cool_q16": scheme.cool_q16,
-                "on_dry": match scheme.on_dry {
-                    OnDry::Fallback => "fallback",
-                    OnDry::Restart => "restart",
-                    OnDry::Stop => "stop",
-                },
+                "on_dry": on_dry_name(scheme.on_dry),
                 "patience": scheme.patience,
                 "target_sae": scheme.target_sae,
                 "time_ms": options.time_limit.map(|limit| limit.as_millis() as u64),
@@ -140,6 +145,14 @@ pub(super) fn key_of_file(destination: &Destination) -> Option<String> {
 fn picture_description(metadata: Result<Metadata>) -> Result<Option<Map<String, Value>>> {
     let told = metadata?.into_iter().find(|(keyword, _)| keyword == KEYWORD);
     Ok(told.and_then(|(_, text)| serde_json::from_str(&text).ok()))
+}
+
+fn on_dry_name(on_dry: OnDry) -> &'static str {
+    match on_dry {
+        OnDry::Fallback => "fallback",
+        OnDry::Restart => "restart",
+        OnDry::Stop => "stop",
+    }
 }
 
 /// SHA-256 over what evolves from a population: its flies and masks, whatever file held them.

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::interrupt::EXIT_INTERRUPTED;
 use super::job::Job;
-use super::options::EvolveOptions;
+use super::options::{EvolveOptions, Verbosity};
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
 use crate::model::{Mosaic, Target};
@@ -111,6 +111,7 @@ impl Row {
     /// Takes in why there is no result.
     pub(super) fn note_failure(&mut self, error: &Error) {
         self.status = Status::Failed;
+        self.output.clear();
         self.error = Some(error.to_string());
     }
 
@@ -132,39 +133,46 @@ pub(super) fn milliseconds(duration: Duration) -> f64 {
 
 /// Peak signal-to-noise ratio in dB over all channels; `None` if the pictures are equal.
 pub(super) fn psnr_db(mosaic: &Mosaic, target: &Target) -> Option<f64> {
-    let channels = |pixels: &[[u8; 3]]| pixels.as_flattened().to_vec();
-    let (drawn, wanted) = (channels(&mosaic.pixels), channels(target.pixels()));
-    let squares: u64 = drawn.iter().zip(&wanted).map(|(&a, &b)| u64::from(a.abs_diff(b)).pow(2)).sum();
-    (squares > 0).then(|| 10.0 * (255.0_f64.powi(2) * drawn.len() as f64 / squares as f64).log10())
+    let squares: u64 = differences(mosaic, target).map(|difference| difference.pow(2)).sum();
+    let channel_count = mosaic.pixels.len() as f64 * 3.0;
+    (squares > 0).then(|| 10.0 * (255.0_f64.powi(2) * channel_count / squares as f64).log10())
 }
 
 /// Sum of absolute errors between a mosaic at evaluation size and its target.
 pub(super) fn sum_of_errors(mosaic: &Mosaic, target: &Target) -> u64 {
+    differences(mosaic, target).sum()
+}
+
+/// The absolute difference of each channel of each pixel.
+fn differences(mosaic: &Mosaic, target: &Target) -> impl Iterator<Item = u64> {
     let pairs = mosaic.pixels.as_flattened().iter().zip(target.pixels().as_flattened());
-    pairs.map(|(&a, &b)| u64::from(a.abs_diff(b))).sum()
+    pairs.map(|(&drawn, &wanted)| u64::from(drawn.abs_diff(wanted)))
 }
 
 /// The summary of a finished evolution.
 pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
-    let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let count = |value: u64| HumanCount(value).to_string();
     let sae = row.sae.unwrap_or_default();
-    let mean_error = sae as f64 / (f64::from(width_px) * f64::from(height_px) * 3.0);
+    let mean_error = sae as f64 / (job.target.pixels().len() as f64 * 3.0);
     let psnr = row.psnr.map_or("infinite PSNR".to_owned(), |db| format!("PSNR {db:.2} dB"));
     let seconds = row.evolve_ms / 1e3;
-    let rate = if seconds > 0.0 { row.births as f64 / seconds } else { 0.0 };
-    let stop = row.stop.unwrap_or_default();
-    say(&format!("{}: {} tiles", size_line(options, job), count(job.fly_count as u64)));
+    let births_per_s = (row.births as f64 / seconds.max(1e-6)) as u64;
+    say(&format!("{}, {} tiles", size_line(options, job), count(job.fly_count as u64)));
     say(&format!("SAE {}, mean error {mean_error:.2} of 255 per channel, {psnr}", count(sae)));
     say(&format!(
-        "{} births ({} by the fallback), {} restarts in {seconds:.2} s: {} births/s",
+        "{} births ({} by the fallback), {} restarts, {seconds:.2} s, {} births/s on {}",
         count(row.births),
         count(row.fallback_kills),
         count(u64::from(row.restarts)),
-        count(rate as u64)
+        count(births_per_s),
+        row.device.as_deref().unwrap_or_default()
     ));
-    let device = row.device.as_deref().unwrap_or_default();
-    say(&format!("seed {}, on {device}, ended by: {stop}", row.seed));
+    say(&format!("seed {}, stopped by {}", row.seed, row.stop.unwrap_or_default()));
+    if options.verbosity == Verbosity::Verbose {
+        say(&format!("read in {:.0} ms, encoded and written in {:.0} ms", row.load_ms, row.save_ms));
+        say(&format!("SHA-256 of the input {}", job.input_sha256));
+        say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
+    }
     let partial = if row.status == Status::Partial { " (partial: run the same command again)" } else { "" };
     say(&format!("wrote {}{partial}", row.output.join(", ")));
 }

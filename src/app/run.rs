@@ -16,7 +16,7 @@ use super::watch::Watch;
 use super::{destination, memory, result};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
-use crate::evolve::{Evolution, StopReason};
+use crate::evolve::Evolution;
 use crate::model::{Canvas, Population};
 use crate::vk::ValidationLog;
 
@@ -137,17 +137,13 @@ fn evolve_job(
     ran?;
     let evolution = &engine.evolutions()[0];
     row.note_evolution(evolution);
-
-    let stop = evolution.stop_reason().unwrap_or(StopReason::Births);
-    let status = if stop == StopReason::Interrupted { Status::Partial } else { Status::Complete };
-    let sae = evolution.best_sae().unwrap_or_default();
-    let ending = Ending { status, stop, sae, outcome: evolution.outcome() };
+    let ending = Ending::of(evolution);
     let population = Population {
         width_px,
         height_px,
         background: job.background,
-        masks: engine.evaluator().scene(0).masks.as_ref().clone(),
-        flies: engine.evolutions()[0].best_flies().to_vec(),
+        masks: job.masks(),
+        flies: evolution.best_flies().to_vec(),
     };
     let evolved = result::draw(engine.evaluator(), options, population, ending)?;
     row.psnr = report::psnr_db(&evolved.mosaic, &job.target);
