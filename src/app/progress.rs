@@ -113,7 +113,7 @@ impl Standing {
 
     fn line(&self) -> String {
         format!(
-            "{} of {} births, SAE {}, {} births/s, {} left",
+            "{}/{} births, SAE {}, {} births/s, {} left",
             HumanCount(self.births),
             HumanCount(self.births_planned),
             HumanCount(self.sae),
@@ -138,7 +138,7 @@ impl Standing {
 
 /// A bar without colours, so that NO_COLOR is obeyed whatever it says.
 fn bar() -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:24} {msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style = ProgressStyle::with_template("{bar:14} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr()).with_style(style)
 }
 
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn a_plain_line_tells_births_fitness_rate_and_time_left() {
-        assert_eq!(standing().line(), "1,000 of 4,000 births, SAE 1,234,567, 100 births/s, 30s left");
+        assert_eq!(standing().line(), "1,000/4,000 births, SAE 1,234,567, 100 births/s, 30s left");
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::destination::{Content, Destination};
 use super::job::Job;
-use super::options::EvolveOptions;
+use super::options::{EvolveOptions, Verbosity};
 use super::provenance::{Ending, Provenance};
 use super::report;
 use crate::archive;
@@ -61,7 +61,11 @@ pub(super) fn draw(
     let long_side_px = options.output_long_side_px.filter(|&long| long != width_px.max(height_px));
     let resized = match long_side_px {
         Some(long) if options.outputs.iter().any(Destination::is_picture) => {
-            Some(evaluator.draw(&population, &Canvas::scaled(width_px, height_px, long), supersampling(long))?)
+            let canvas = Canvas::scaled(width_px, height_px, long);
+            if options.verbosity > Verbosity::Quiet {
+                report::say(&format!("drawing {}x{} px", canvas.width_px, canvas.height_px));
+            }
+            Some(evaluator.draw(&population, &canvas, supersampling(long))?)
         }
         _ => None,
     };
@@ -76,18 +80,17 @@ fn supersampling(long_side_px: u32) -> u32 {
 /// The outputs as bytes; nothing is written before all of them are there.
 pub(super) fn encode<'a>(
     options: &'a EvolveOptions,
-    evolved: &Evolved,
+    evolved: Evolved,
     provenance: &Provenance,
 ) -> Result<Vec<EncodedFile<'a>>> {
-    let picture = options.outputs.iter().any(Destination::is_picture);
-    let mosaic = evolved.resized.as_ref().unwrap_or(&evolved.mosaic);
-    let photo = picture.then(|| photo_of(mosaic.width_px, mosaic.height_px, &mosaic.pixels));
+    let Mosaic { width_px, height_px, pixels } = evolved.resized.unwrap_or(evolved.mosaic);
+    let photo = Photo { width_px, height_px, pixels };
     let metadata = provenance.picture_metadata(Some(&evolved.ending));
     let encode_one = |destination: &'a Destination| {
-        let bytes = match (destination.content, &photo) {
-            (Content::Png, Some(photo)) => photo::encode_png(photo, &metadata),
-            (Content::Jpeg, Some(photo)) => photo::encode_jpeg(photo, JPEG_QUALITY, &metadata),
-            _ => {
+        let bytes = match destination.content {
+            Content::Png => photo::encode_png(&photo, &metadata),
+            Content::Jpeg => photo::encode_jpeg(&photo, JPEG_QUALITY, &metadata),
+            Content::Population => {
                 let told = provenance.population_metadata(&evolved.ending);
                 archive::encode(&evolved.population, &evolved.marginal, &told)
             }
@@ -104,7 +107,8 @@ pub(super) fn encode_target<'a>(
     provenance: &Provenance,
 ) -> Result<Option<EncodedFile<'a>>> {
     let Some(destination) = &options.save_target else { return Ok(None) };
-    let photo = photo_of(job.target.width_px(), job.target.height_px(), job.target.pixels());
+    let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
+    let photo = Photo { width_px, height_px, pixels: job.target.pixels().to_vec() };
     let bytes = photo::encode_png(&photo, &provenance.picture_metadata(None))?;
     Ok(Some(EncodedFile { destination, bytes }))
 }
@@ -118,10 +122,6 @@ pub(super) fn write(files: &[EncodedFile<'_>]) -> Result<()> {
             output::write_atomically(&destination.path, bytes)
         }
     })
-}
-
-fn photo_of(width_px: u32, height_px: u32, pixels: &[[u8; 3]]) -> Photo {
-    Photo { width_px, height_px, pixels: pixels.to_vec() }
 }
 
 #[cfg(test)]

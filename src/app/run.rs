@@ -55,12 +55,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     row.key = Some(provenance.key().to_owned());
     row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
     let memory_bytes = check_job(options, &job)?;
-    for output in &options.outputs {
-        destination::check_replaceable(output, provenance.key(), options.overwrite)?;
-    }
-    if let Some(output) = &options.save_target {
-        destination::check_replaceable(output, target_provenance.key(), options.overwrite)?;
-    }
+    check_replaceable(options, &provenance, &target_provenance)?;
     if options.mode == Mode::DryRun {
         row.status = Status::Planned;
         report::print_plan(row, options, &job, memory_bytes);
@@ -69,11 +64,12 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
 
     let evolved = evolve_job(options, &job, selected, &interrupt, row)?;
     let began = Instant::now();
-    let mut files = result::encode(options, &evolved, &provenance)?;
+    let status = evolved.ending.status;
+    let mut files = result::encode(options, evolved, &provenance)?;
     files.extend(result::encode_target(options, &job, &target_provenance)?);
     interrupt.while_writing(|| result::write(&files))?;
     row.save_ms = report::milliseconds(began.elapsed());
-    row.status = evolved.ending.status;
+    row.status = status;
     if options.verbosity > Verbosity::Quiet {
         report::print_summary(row, options, &job);
     }
@@ -106,6 +102,13 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
     let needed_bytes = memory::estimate_bytes(pixel_count, job.fly_count, output_pixel_count);
     memory::check(needed_bytes)?;
     Ok(needed_bytes)
+}
+
+/// Refuses to replace files that are not what this command would write.
+fn check_replaceable(options: &EvolveOptions, mosaic: &Provenance, target: &Provenance) -> Result<()> {
+    let outputs = options.outputs.iter().map(|output| (output, mosaic.key()));
+    let targets = options.save_target.iter().map(|output| (output, target.key()));
+    outputs.chain(targets).try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))
 }
 
 /// Says what somebody should know before the work begins.
