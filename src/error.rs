@@ -67,6 +67,9 @@ pub enum Error {
     /// The validation layer complained (only with `--validate`).
     #[error("Vulkan validation: {0}")]
     Validation(String),
+    /// The engine contradicts itself: a bug.
+    #[error("internal error: {0}; please report it with the command that led to it")]
+    Internal(String),
 }
 
 impl Error {
@@ -88,7 +91,11 @@ impl Error {
             Self::Usage(_) | Self::Input { .. } | Self::TooLarge(_) => 2,
             Self::NoSuitableDevice { .. } => 4,
             Self::DeviceLost { .. } => 75,
-            Self::Output { .. } | Self::OutOfDeviceMemory { .. } | Self::Vulkan { .. } | Self::Validation(_) => 1,
+            Self::Output { .. }
+            | Self::OutOfDeviceMemory { .. }
+            | Self::Vulkan { .. }
+            | Self::Validation(_)
+            | Self::Internal(_) => 1,
         }
     }
 }

@@ -5,6 +5,7 @@
 //! absolute errors (SAE, lower is better); the marginal fitness of a fly is the SAE without it minus the SAE with it, so
 //! a positive value means that the fly helps.
 
+pub mod app;
 pub mod archive;
 pub mod cpu;
 pub mod engine;

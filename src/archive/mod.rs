@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 use crate::model::Population;
 
 pub use encode::encode;
-pub use read::read;
+pub use read::{read, read_meta};
 
 /// Version of the file's layout.
 const SCHEMA: u32 = 1;

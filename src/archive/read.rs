@@ -5,6 +5,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use npyz::{Deserialize, NpyFile, Order};
+use serde_json::{Map, Value};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
@@ -33,6 +34,17 @@ const ARRAY_HEADER_BYTES_MAX: usize = 4096;
 /// one of another type or length, a value that is not finite, or a mask that does not exist.
 pub fn read(path: &Path) -> Result<Archive> {
     read_population(path).map_err(|reason| Error::input(path, reason))
+}
+
+/// What the writer of the population at `path` told, without reading the population.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read or is no population.
+pub fn read_meta(path: &Path) -> Result<Map<String, Value>> {
+    Members::open(path)
+        .and_then(|mut members| members.header())
+        .map(|header| header.meta)
+        .map_err(|reason| Error::input(path, reason))
 }
 
 fn read_population(path: &Path) -> Result<Archive, String> {

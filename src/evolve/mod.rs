@@ -8,5 +8,8 @@ pub mod restart;
 pub mod scheme;
 pub mod selection;
 
+/// Version of the algorithm: raised whenever the same picture, options and seed lead to another result.
+pub const ALGORITHM_VERSION: u32 = 1;
+
 pub use evolution::{Evolution, Outcome, Step, StopReason};
 pub use scheme::{OnDry, PaperScheme};

@@ -4,7 +4,11 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test that it is in")]
 
 mod canary;
+mod cli;
+mod cli_interrupts;
+mod cli_refusals;
 mod exactness;
 mod reference;
 mod scenarios;
 mod vulkan;
+mod workshop;

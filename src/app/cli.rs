@@ -1,0 +1,216 @@
+//! What was typed: commands and flags with their help. What they mean is decided in `options`.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::error::ErrorKind;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use super::{report, values};
+use crate::model::Rgb;
+
+/// Evolves pictures into mosaics of thousands of tiles.
+#[derive(Debug, Parser)]
+#[command(
+    name = "smalti",
+    version,
+    about = "Evolves pictures into mosaics of thousands of tiles.",
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage or unreadable input, 4 no suitable device,\n\
+                  75 interrupted or device lost (run the same command again), 130 second Ctrl-C."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+impl Cli {
+    /// The command line of this process; if it is wrong, or only asks for help, the exit code after having said so.
+    ///
+    /// # Errors
+    /// The exit code to end with: 0 after help or version, 2 after a wrong command line.
+    pub fn from_command_line() -> Result<Self, ExitCode> {
+        Self::try_parse().map_err(|error| {
+            if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+                report::error(&one_sentence(&error.to_string()));
+            } else {
+                // Only a closed pipe can fail here: nobody wants the rest of the help.
+                let _ = error.print();
+            }
+            ExitCode::from(if error.use_stderr() { 2 } else { 0 })
+        })
+    }
+}
+
+/// The first paragraphs of a message of clap in one line, without the usage that follows them.
+fn one_sentence(message: &str) -> String {
+    let told = message.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
+    let told: Vec<String> = told
+        .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
+        .map(|line| line.strip_prefix("tip: ").map_or_else(|| line.to_owned(), |tip| format!("({tip})")))
+        .collect();
+    let told = told.join(" ");
+    format!("{}; see smalti --help", told.strip_prefix("error: ").unwrap_or(&told))
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Evolve one picture into a mosaic
+    ///
+    /// Thousands of coloured tiles are bred, one death and one birth at a time, until together they look like the
+    /// picture. The same picture, options and seed give the same bytes on every device.
+    Evolve(Box<EvolveArgs>),
+    /// List the Vulkan devices of this machine, and which one would be taken
+    Devices(DevicesArgs),
+}
+
+const EVOLVE_EXAMPLES: &str = "\
+Examples:
+  smalti evolve photo.jpg -o mosaic.png
+  smalti evolve photo.jpg -o mosaic.png -o flies.npz -n 10k --births 200k --restarts 3 --cool 0.5
+  smalti evolve photo.jpg -o poster.png --output-size 4096 --time 2m
+  smalti evolve photo.jpg -o better.png --init flies.npz --seed 1
+  smalti evolve photo.jpg -o - --quiet > mosaic.png";
+
+#[derive(Debug, Args)]
+#[command(after_help = EVOLVE_EXAMPLES)]
+pub(super) struct EvolveArgs {
+    /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP, or the first frame of a GIF
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+
+    /// Where to write the mosaic (.png, .jpg) or the population (.npz); may repeat; `-` writes a PNG to stdout
+    #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
+    pub outputs: Vec<PathBuf>,
+    /// Longer side of the written picture, 1 to 65,535 px; the mosaic is drawn anew at that size [default: as evolved]
+    #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Output")]
+    pub output_size: Option<u64>,
+    /// Also write the picture that was evolved towards, fitted to size, as a PNG
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub save_target: Option<PathBuf>,
+    /// Replace outputs that are not smalti's or were made with other options
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    /// Only say what would be done; write nothing
+    #[arg(long, help_heading = "Output")]
+    pub dry_run: bool,
+    /// Print one line of JSON about the result to stdout
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+
+    /// Number of tiles, 1 to 1,000,000 (suffixes k, M) [default: 2500 * sqrt(width * height) / 256, rounded]
+    #[arg(short = 'n', long, value_name = "N", value_parser = values::count, help_heading = "Picture")]
+    pub tiles: Option<u64>,
+    /// Longer side that the picture is reduced to before it is evolved, 1 to 65,535 px; never enlarged
+    #[arg(long, value_name = "PX", value_parser = values::count, default_value = "512", help_heading = "Picture")]
+    pub size: u64,
+    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: black, or as in --init]
+    #[arg(long, value_name = "COLOR", value_parser = values::color, help_heading = "Picture")]
+    pub background: Option<Rgb>,
+    /// Population to begin with, a .npz file of the same picture size; it also gives the number of tiles
+    #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]
+    pub init: Option<PathBuf>,
+
+    /// How to evolve; `paper` is the published Fly algorithm
+    #[arg(long, value_enum, value_name = "NAME", default_value = "paper", help_heading = "Evolution")]
+    pub scheme: SchemeName,
+    /// Births of each run (suffixes k, M)
+    #[arg(long, value_name = "B", value_parser = values::count, default_value = "40k", help_heading = "Evolution")]
+    pub births: u64,
+    /// Births evaluated together, 1 to N; more is faster on a GPU, 1 is the published algorithm
+    #[arg(long, value_name = "K", value_parser = values::count, default_value = "1", help_heading = "Evolution")]
+    pub batch_births: u64,
+    /// Further runs, each from the best population so far, 0 to 1,000,000
+    #[arg(long, value_name = "R", value_parser = values::count, default_value = "0", help_heading = "Evolution")]
+    pub restarts: u64,
+    /// Factor of all mutation steps at each restart, above 0 up to 1
+    #[arg(long, value_name = "F", default_value_t = 1.0, help_heading = "Evolution")]
+    pub cool: f64,
+    /// What to do when no bad tile is found: take the worse of two, begin the next run, or stop
+    #[arg(long, value_enum, value_name = "ACTION", default_value = "fallback", help_heading = "Evolution")]
+    pub on_dry: OnDryName,
+    /// End a run after this many births without improvement, at least 1 (suffixes k, M) [default: never]
+    #[arg(long, value_name = "B", value_parser = values::count, help_heading = "Evolution")]
+    pub patience: Option<u64>,
+    /// Stop once the sum of absolute errors is at most this (suffixes k, M) [default: never]
+    #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Evolution")]
+    pub target_sae: Option<u64>,
+    /// Stop after this time even if births are left: 90, 30s, 2m, 1h30m [default: never]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Evolution")]
+    pub time: Option<Duration>,
+    /// Number that decides every random choice
+    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Evolution")]
+    pub seed: u64,
+
+    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
+    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]
+    pub device: String,
+    /// CPU threads, 1 to 1,024; changes no result [default: all]
+    #[arg(long, value_name = "T", value_parser = values::count, help_heading = "Computing")]
+    pub threads: Option<u64>,
+    /// Watch every Vulkan call with the validation layer; any message is an error
+    #[arg(long, help_heading = "Computing")]
+    pub validate: bool,
+
+    /// How to show progress on stderr; a bar needs a terminal, elsewhere it becomes plain lines
+    #[arg(long, value_enum, value_name = "KIND", default_value = "auto", help_heading = "Messages")]
+    pub progress: ProgressKind,
+    /// Say more
+    #[arg(short, long, help_heading = "Messages", conflicts_with = "quiet")]
+    pub verbose: bool,
+    /// Say nothing but errors
+    #[arg(short, long, help_heading = "Messages")]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DevicesArgs {
+    /// Print JSON to stdout instead of a table
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum SchemeName {
+    Paper,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum OnDryName {
+    Fallback,
+    Restart,
+    Stop,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProgressKind {
+    /// A bar on a terminal, else plain lines
+    Auto,
+    Bar,
+    /// A line every few seconds
+    Plain,
+    /// A line of JSON every second
+    Json,
+    None,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_definition_of_the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_message_of_clap_becomes_one_sentence() {
+        let message = "error: unexpected argument '--sed' found\n\n  tip: a similar argument exists: '--seed'\n\n\
+                       Usage: smalti evolve <IN>\n\nFor more information, try '--help'.\n";
+        let sentence = "unexpected argument '--sed' found (a similar argument exists: '--seed'); see smalti --help";
+        assert_eq!(one_sentence(message), sentence);
+    }
+}

@@ -1,0 +1,116 @@
+//! Where results go: what a path's ending asks for, and whether the path may be written to.
+
+use std::ffi::OsStr;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+
+use super::options::Overwrite;
+use super::provenance;
+use crate::error::{Error, Result};
+use crate::output;
+
+/// What is written to a destination.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Content {
+    /// A picture as PNG.
+    Png,
+    /// A picture as JPEG.
+    Jpeg,
+    /// The population.
+    Population,
+}
+
+/// A file, or stdout as `-`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Destination {
+    /// The path as the user wrote it.
+    pub path: PathBuf,
+    /// What is written to it.
+    pub content: Content,
+}
+
+impl Destination {
+    /// The destination of a result; the ending of `path` tells what is written.
+    pub(super) fn for_result(path: &Path) -> Result<Self> {
+        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
+        let content = match extension.as_str() {
+            "png" => Content::Png,
+            "jpg" | "jpeg" => Content::Jpeg,
+            "npz" => Content::Population,
+            _ if path == Path::new("-") => Content::Png,
+            _ => {
+                let path = path.display();
+                return Err(Error::Usage(format!("{path}: an output must end in .png, .jpg, .jpeg or .npz, or be -")));
+            }
+        };
+        Ok(Self { path: path.to_owned(), content })
+    }
+
+    /// The destination of the fitted picture.
+    pub(super) fn for_target(path: &Path) -> Result<Self> {
+        match Self::for_result(path) {
+            Ok(destination) if destination.content == Content::Png && !destination.is_stdout() => Ok(destination),
+            _ => Err(Error::Usage(format!("{}: the file of --save-target must end in .png", path.display()))),
+        }
+    }
+
+    /// Whether this is stdout instead of a file.
+    pub(super) fn is_stdout(&self) -> bool {
+        self.path == Path::new("-")
+    }
+
+    /// Whether a picture is written, rather than a population.
+    pub(super) fn is_picture(&self) -> bool {
+        self.content != Content::Population
+    }
+}
+
+/// Checks, before anything is read, that every destination can be written, none is named twice, and none is the input.
+pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destination>, input: &Path) -> Result<()> {
+    let mut seen: Vec<PathBuf> = Vec::new();
+    for destination in destinations {
+        let place = place_of(&destination.path);
+        if seen.contains(&place) {
+            return Err(Error::Usage(format!("{} is named twice as an output", destination.path.display())));
+        }
+        if destination.is_stdout() {
+            if std::io::stdout().is_terminal() {
+                let sentence = "-o - would write a picture to the terminal; redirect it to a file or a pipe";
+                return Err(Error::Usage(sentence.to_owned()));
+            }
+        } else {
+            if place == place_of(input) {
+                return Err(Error::Usage(format!(
+                    "{} is the input; name another file for the output",
+                    destination.path.display()
+                )));
+            }
+            output::check_writable(&destination.path)?;
+        }
+        seen.push(place);
+    }
+    Ok(())
+}
+
+/// Refuses to replace a file that the same command, perhaps interrupted, would not have written.
+pub(super) fn check_replaceable(destination: &Destination, key: &str, overwrite: Overwrite) -> Result<()> {
+    // Devices and pipes are not replaced.
+    if overwrite == Overwrite::Force || destination.is_stdout() || !destination.path.is_file() {
+        return Ok(());
+    }
+    let why = match provenance::key_of_file(destination) {
+        Some(found) if found == key => return Ok(()),
+        Some(_) => "made with other options",
+        None => "not made by smalti",
+    };
+    let path = destination.path.display();
+    Err(Error::Usage(format!("{path} exists and was {why}; name another file, or replace it with --force")))
+}
+
+/// One name for one file, however it was written.
+fn place_of(path: &Path) -> PathBuf {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    path.canonicalize()
+        .or_else(|_| Ok(folder.canonicalize()?.join(path.file_name().unwrap_or_default())))
+        .unwrap_or_else(|_: std::io::Error| path.to_owned())
+}

@@ -1,0 +1,115 @@
+//! What an evolution begins from: the picture, fitted and opaque, and the population of `--init`.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::options::EvolveOptions;
+use crate::archive;
+use crate::error::{Error, Result};
+use crate::evolve::evolution::random_population;
+use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
+use crate::photo::{self, Loaded, ReadOptions};
+
+/// The inputs of one evolution, read and fitted together.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub target: Arc<Target>,
+    /// Size in px of the upright picture before it was fitted.
+    pub original_size_px: (u32, u32),
+    /// SHA-256 of the input file, hexadecimal.
+    pub input_sha256: String,
+    /// What was ignored in the input, one sentence each.
+    pub warnings: Vec<String>,
+    pub background: Rgb,
+    pub fly_count: usize,
+    /// The population to begin with, if not a random one.
+    pub init: Option<Population>,
+}
+
+impl Job {
+    /// Reads the picture and the population.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if one of them cannot be used, or they do not fit together.
+    pub(super) fn load(options: &EvolveOptions) -> Result<Self> {
+        let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
+        let of_init = init.as_ref().map(|population| population.background);
+        let background = options.background.or(of_init).unwrap_or_default();
+        let reading = ReadOptions { background, long_side_px: Some(options.long_side_px) };
+        let Loaded { photo, original_width_px, original_height_px, sha256, warnings } =
+            photo::read(&options.input, &reading)?;
+        let target = Target::new(photo.width_px, photo.height_px, photo.pixels)?;
+        if let (Some(population), Some(path)) = (&init, &options.init) {
+            check_fit(population, path, &target)?;
+        }
+        let fly_count = init.as_ref().map(|population| population.flies.len()).or(options.fly_count);
+        Ok(Self {
+            fly_count: fly_count.unwrap_or_else(|| default_fly_count(target.width_px(), target.height_px())),
+            target: Arc::new(target),
+            original_size_px: (original_width_px, original_height_px),
+            input_sha256: sha256,
+            warnings,
+            background,
+            init,
+        })
+    }
+
+    /// The tile shapes that the flies may wear.
+    pub(super) fn masks(&self) -> MaskSet {
+        self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone())
+    }
+
+    /// The lane that the job becomes.
+    pub(super) fn scene(&self) -> Scene {
+        Scene {
+            target: Arc::clone(&self.target),
+            masks: Arc::new(self.masks()),
+            background: self.background,
+            fly_count: self.fly_count,
+        }
+    }
+
+    /// The flies to begin with.
+    pub(super) fn first_flies(&self, seed: u64) -> Vec<Fly> {
+        let random = || random_population(self.target.width_px(), self.target.height_px(), self.fly_count, seed);
+        self.init.as_ref().map_or_else(random, |population| population.flies.clone())
+    }
+}
+
+fn check_fit(population: &Population, path: &Path, target: &Target) -> Result<()> {
+    let (of_population, of_target) =
+        ((population.width_px, population.height_px), (target.width_px(), target.height_px()));
+    if of_population != of_target {
+        return Err(Error::input(
+            path,
+            format!(
+                "holds a population for a picture of {}x{} px and this one is {}x{} px; give the picture and --size that \
+                 it was evolved with",
+                of_population.0, of_population.1, of_target.0, of_target.1
+            ),
+        ));
+    }
+    if population.flies.is_empty() {
+        return Err(Error::input(path, "holds no flies; give a population of at least one"));
+    }
+    Ok(())
+}
+
+/// Flies for a picture, so that a fly's share of it grows with its side: 2,500 at 256x256, 5,000 at 512x512 (Table 2).
+fn default_fly_count(width_px: u32, height_px: u32) -> usize {
+    let pixels = f64::from(width_px) * f64::from(height_px);
+    // IEEE 754 fixes the root and the product, so every machine agrees.
+    (2500.0 * pixels.sqrt() / 256.0).round() as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::default_fly_count;
+
+    #[test]
+    fn the_default_number_of_flies_gives_both_rows_of_table_2() {
+        assert_eq!(default_fly_count(256, 256), 2500);
+        assert_eq!(default_fly_count(512, 512), 5000);
+        assert_eq!(default_fly_count(1, 1), 10);
+    }
+}

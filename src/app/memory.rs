@@ -1,0 +1,70 @@
+//! Whether the work fits into memory, found out before it begins.
+
+use crate::error::{Error, Result};
+
+// The first two are about twice what the CPU twin takes for a random population of 50,000 flies at 4096x4096, and of
+// 1,000,000 at 512x512, since lists grow while tiles gather.
+/// Bytes per pixel of the evolved picture: its layers, its share of block lists, target and mosaic.
+const BYTES_PER_PIXEL: u64 = 40;
+/// Bytes per fly: genes in the current and best population, tile, fitness, and its entries in block lists.
+const BYTES_PER_FLY: u64 = 512;
+/// Bytes per pixel of the written picture: the mosaic, the encoder's copy, and the encoded file.
+const BYTES_PER_OUTPUT_PIXEL: u64 = 10;
+
+/// About how many bytes an evolution needs.
+pub(super) fn estimate_bytes(pixel_count: u64, fly_count: usize, output_pixel_count: u64) -> u64 {
+    pixel_count * BYTES_PER_PIXEL
+        + fly_count as u64 * BYTES_PER_FLY
+        + output_pixel_count.saturating_mul(BYTES_PER_OUTPUT_PIXEL)
+}
+
+/// Refuses what needs more memory than there is; passes where that is not known.
+///
+/// # Errors
+/// [`Error::TooLarge`].
+pub(super) fn check(needed_bytes: u64) -> Result<()> {
+    let available_bytes = std::fs::read_to_string("/proc/meminfo").ok().and_then(|told| available_bytes(&told));
+    check_against(needed_bytes, available_bytes)
+}
+
+fn check_against(needed_bytes: u64, available_bytes: Option<u64>) -> Result<()> {
+    match available_bytes {
+        Some(available_bytes) if needed_bytes > available_bytes => Err(Error::TooLarge(format!(
+            "this needs about {} MiB of memory and {} MiB are free; use a smaller --size or --output-size, or fewer --tiles",
+            needed_bytes >> 20,
+            available_bytes >> 20
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The memory that Linux could give out without swapping.
+fn available_bytes(meminfo: &str) -> Option<u64> {
+    let kibibytes = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    kibibytes.trim().strip_suffix(" kB")?.parse::<u64>().ok()?.checked_mul(1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_free_memory_is_found_in_what_linux_tells() {
+        let meminfo = "MemTotal:       24689124 kB\nMemFree:  1 kB\nMemAvailable:   23000000 kB\nBuffers: 2 kB\n";
+        assert_eq!(available_bytes(meminfo), Some(23_000_000 * 1024));
+        assert_eq!(available_bytes("MemTotal: 1 kB\n"), None);
+    }
+
+    #[test]
+    fn more_than_the_free_memory_is_refused_with_both_numbers() {
+        assert!(check_against(1 << 30, Some(1 << 30)).is_ok());
+        assert!(check_against(1 << 60, None).is_ok());
+        let refusal = check_against(3 << 30, Some(1 << 30)).expect_err("there is not enough").to_string();
+        assert!(refusal.contains("3072 MiB") && refusal.contains("1024 MiB"), "{refusal}");
+    }
+
+    #[test]
+    fn absurd_sizes_do_not_overflow_the_estimate() {
+        assert!(estimate_bytes(1 << 28, 1_000_000, 65_535 * 65_535) > 40 << 30);
+    }
+}

@@ -1,0 +1,33 @@
+//! Everything that a person touches: the command line, its messages and its exit codes.
+//!
+//! Only this module prints, reads the clock, the environment, or paths given by the user. Failures end as one sentence
+//! on stderr; stdout carries data only.
+
+mod cli;
+mod destination;
+mod device;
+mod devices;
+mod interrupt;
+mod job;
+mod memory;
+mod options;
+mod progress;
+mod provenance;
+mod report;
+mod result;
+mod run;
+mod values;
+mod watch;
+
+use std::process::ExitCode;
+
+pub use cli::Cli;
+
+/// Does what the command line asks for; the exit code of the process.
+#[must_use]
+pub fn run(cli: &Cli) -> ExitCode {
+    match &cli.command {
+        cli::Command::Evolve(args) => run::evolve(args),
+        cli::Command::Devices(args) => devices::list(args),
+    }
+}

@@ -1,0 +1,163 @@
+//! What the command line means: every value checked, every default filled in that needs no picture.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
+use super::destination::Destination;
+use crate::error::{Error, Result};
+use crate::evolve::{OnDry, PaperScheme};
+use crate::model::Rgb;
+use crate::model::population::FLY_COUNT_MAX;
+use crate::model::target::TARGET_SIDE_MAX_PX;
+use crate::vk::{DeviceRequest, Validation};
+
+/// Most restarts of one evolution.
+const RESTARTS_MAX: u64 = 1_000_000;
+/// Most CPU threads.
+const THREADS_MAX: u64 = 1_024;
+
+/// What to do about outputs that exist already and are not what the same command would write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Overwrite {
+    Refuse,
+    Force,
+}
+
+/// Whether to do the work or only to say what it would be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    Work,
+    DryRun,
+}
+
+/// How much to say on stderr.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Verbosity {
+    Quiet,
+    Normal,
+    Verbose,
+}
+
+/// Everything that `smalti evolve` was asked to do.
+#[derive(Clone, Debug)]
+pub(super) struct EvolveOptions {
+    pub input: PathBuf,
+    pub outputs: Vec<Destination>,
+    pub save_target: Option<Destination>,
+    /// Longer side of the written picture in px; `None` writes it as evolved.
+    pub output_long_side_px: Option<u32>,
+    pub overwrite: Overwrite,
+    pub mode: Mode,
+    /// Number of flies; `None` leaves it to the picture's size, or to `init`.
+    pub fly_count: Option<usize>,
+    /// Longer side in px that the picture is reduced to.
+    pub long_side_px: u32,
+    /// `None` means the one of `init`, else black.
+    pub background: Option<Rgb>,
+    pub init: Option<PathBuf>,
+    pub scheme: PaperScheme,
+    pub time_limit: Option<Duration>,
+    pub device: DeviceRequest,
+    pub validation: Validation,
+    pub threads: Option<usize>,
+    pub progress: ProgressKind,
+    pub verbosity: Verbosity,
+}
+
+impl EvolveOptions {
+    /// Checks what was typed.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names the flag and what it may be.
+    pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
+        let sides = (1, u64::from(TARGET_SIDE_MAX_PX));
+        let side_px = |flag, px| in_range(flag, px, sides).map(|px| px as u32);
+        let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
+        let threads = args.threads.map(|count| in_range("--threads", count, (1, THREADS_MAX))).transpose()?;
+        let device: DeviceRequest = args.device.parse()?;
+        if args.validate && device == DeviceRequest::Cpu {
+            return Err(Error::Usage(
+                "--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned(),
+            ));
+        }
+        let options = Self {
+            input: args.input.clone(),
+            outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
+            save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
+            output_long_side_px: args.output_size.map(|px| side_px("--output-size", px)).transpose()?,
+            overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
+            mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
+            fly_count: fly_count.map(|count| count as usize),
+            long_side_px: side_px("--size", args.size)?,
+            background: args.background,
+            init: args.init.clone(),
+            scheme: scheme(args)?,
+            time_limit: args.time,
+            device,
+            validation: if args.validate { Validation::On } else { Validation::Off },
+            threads: threads.map(|count| count as usize),
+            progress: progress(args),
+            verbosity: verbosity(args),
+        };
+        if args.json && options.outputs.iter().any(Destination::is_stdout) {
+            return Err(Error::Usage("-o - and --json both write to stdout; drop one of them".to_owned()));
+        }
+        Ok(options)
+    }
+
+    /// Every file that will be written.
+    pub(super) fn destinations(&self) -> impl Iterator<Item = &Destination> {
+        self.outputs.iter().chain(&self.save_target)
+    }
+}
+
+fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
+    let SchemeName::Paper = args.scheme;
+    let batch_births = in_range("--batch-births", args.batch_births, (1, FLY_COUNT_MAX as u64))?;
+    let restarts = in_range("--restarts", args.restarts, (0, RESTARTS_MAX))?;
+    let patience = args.patience.map(|births| in_range("--patience", births, (1, u64::MAX))).transpose()?;
+    let cool_q16 = (args.cool * 65_536.0).round();
+    if !(1.0..=65_536.0).contains(&cool_q16) {
+        return Err(Error::Usage(format!("--cool {}: must be above 0 and at most 1", args.cool)));
+    }
+    if cool_q16 < 65_536.0 && restarts == 0 {
+        return Err(Error::Usage("--cool changes only the runs after the first; add --restarts".to_owned()));
+    }
+    Ok(PaperScheme {
+        seed: args.seed,
+        births: args.births,
+        restarts: restarts as u32,
+        cool_q16: cool_q16 as u32,
+        on_dry: match args.on_dry {
+            OnDryName::Fallback => OnDry::Fallback,
+            OnDryName::Restart => OnDry::Restart,
+            OnDryName::Stop => OnDry::Stop,
+        },
+        patience,
+        target_sae: args.target_sae,
+        batch_births: batch_births as u32,
+    })
+}
+
+fn progress(args: &EvolveArgs) -> ProgressKind {
+    if args.quiet && args.progress == ProgressKind::Auto { ProgressKind::None } else { args.progress }
+}
+
+fn verbosity(args: &EvolveArgs) -> Verbosity {
+    match (args.quiet, args.verbose) {
+        (true, _) => Verbosity::Quiet,
+        (false, true) => Verbosity::Verbose,
+        (false, false) => Verbosity::Normal,
+    }
+}
+
+fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
+    if (least..=most).contains(&value) {
+        Ok(value)
+    } else if most == u64::MAX {
+        Err(Error::Usage(format!("{flag} {value}: must be at least {least}")))
+    } else {
+        Err(Error::Usage(format!("{flag} {value}: must be {least} to {most}")))
+    }
+}

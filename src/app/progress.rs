@@ -1,0 +1,184 @@
+//! Progress on stderr: a bar on a terminal, else a plain line or a line of JSON now and then.
+
+use std::io::{self, IsTerminal};
+use std::time::Duration;
+
+use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde_json::json;
+
+use super::cli::ProgressKind;
+use super::report;
+
+/// Where an evolution stands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Standing {
+    /// Time since it began.
+    pub elapsed: Duration,
+    pub births: u64,
+    pub births_planned: u64,
+    /// Global fitness of the best population.
+    pub sae: u64,
+    /// Time after which it is ended.
+    pub time_limit: Option<Duration>,
+}
+
+/// Shows where an evolution stands.
+#[derive(Debug)]
+pub(super) struct Progress {
+    form: Form,
+    next: Duration,
+}
+
+#[derive(Debug)]
+enum Form {
+    Nothing,
+    Bar(ProgressBar),
+    Plain,
+    Json,
+}
+
+impl Progress {
+    /// Progress of the kind that was asked for, as far as stderr can show it.
+    pub(super) fn new(kind: ProgressKind) -> Self {
+        let is_terminal = io::stderr().is_terminal();
+        let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
+        let form = match kind {
+            ProgressKind::None => Form::Nothing,
+            ProgressKind::Json => Form::Json,
+            ProgressKind::Bar if is_terminal => Form::Bar(bar()),
+            ProgressKind::Auto if is_terminal && !is_dumb => Form::Bar(bar()),
+            ProgressKind::Auto | ProgressKind::Bar | ProgressKind::Plain => Form::Plain,
+        };
+        let next = form.interval();
+        Self { form, next }
+    }
+
+    /// Whether it is time to show something.
+    pub(super) fn is_due(&self, elapsed: Duration) -> bool {
+        elapsed >= self.next
+    }
+
+    /// Shows the standing.
+    pub(super) fn show(&mut self, standing: &Standing) {
+        self.next = standing.elapsed + self.form.interval();
+        match &self.form {
+            Form::Nothing => {}
+            Form::Bar(bar) => {
+                bar.set_length(1000);
+                bar.set_position((standing.share() * 1000.0) as u64);
+                bar.set_message(standing.line());
+            }
+            Form::Plain => report::say(&standing.line()),
+            Form::Json => report::say(&standing.json_line()),
+        }
+    }
+
+    /// Takes the bar away; what comes next begins on a clean line.
+    pub(super) fn finish(&self) {
+        if let Form::Bar(bar) = &self.form {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+impl Form {
+    /// Time between two displays.
+    fn interval(&self) -> Duration {
+        match self {
+            Self::Nothing => Duration::MAX,
+            Self::Bar(_) => Duration::from_millis(100),
+            Self::Plain => Duration::from_secs(5),
+            Self::Json => Duration::from_secs(1),
+        }
+    }
+}
+
+impl Standing {
+    fn births_per_s(&self) -> f64 {
+        self.births as f64 / self.elapsed.as_secs_f64().max(1e-9)
+    }
+
+    /// Seconds left: until all births are made, or the time is up.
+    fn eta_s(&self) -> f64 {
+        let by_births = (self.births_planned - self.births.min(self.births_planned)) as f64 / self.births_per_s();
+        let by_time = self.time_limit.map(|limit| limit.saturating_sub(self.elapsed).as_secs_f64());
+        by_time.map_or(by_births, |left| left.min(by_births))
+    }
+
+    /// How much is done, 0 to 1.
+    fn share(&self) -> f64 {
+        let elapsed_s = self.elapsed.as_secs_f64();
+        elapsed_s / (elapsed_s + self.eta_s()).max(1e-9)
+    }
+
+    fn line(&self) -> String {
+        format!(
+            "{}/{} births, SAE {}, {} births/s, {} left",
+            HumanCount(self.births),
+            HumanCount(self.births_planned),
+            HumanCount(self.sae),
+            HumanCount(self.births_per_s() as u64),
+            short_time(self.eta_s())
+        )
+    }
+
+    fn json_line(&self) -> String {
+        let rounded = |value: f64| (value * 10.0).round() / 10.0;
+        json!({
+            "births": self.births,
+            "births_planned": self.births_planned,
+            "sae": self.sae,
+            "births_per_s": rounded(self.births_per_s()),
+            "elapsed_s": rounded(self.elapsed.as_secs_f64()),
+            "eta_s": rounded(self.eta_s()),
+        })
+        .to_string()
+    }
+}
+
+/// A bar without colours, so that NO_COLOR is obeyed whatever it says.
+fn bar() -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:14} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr()).with_style(style)
+}
+
+/// A time as `8s`, `2m10s` or `3h05m`.
+fn short_time(seconds: f64) -> String {
+    let seconds = seconds.ceil() as u64;
+    match seconds {
+        0..60 => format!("{seconds}s"),
+        60..3_600 => format!("{}m{:02}s", seconds / 60, seconds % 60),
+        _ => format!("{}h{:02}m", seconds / 3_600, seconds % 3_600 / 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn standing() -> Standing {
+        let elapsed = Duration::from_secs(10);
+        Standing { elapsed, births: 1_000, births_planned: 4_000, sae: 1_234_567, time_limit: None }
+    }
+
+    #[test]
+    fn a_plain_line_tells_births_fitness_rate_and_time_left() {
+        assert_eq!(standing().line(), "1,000/4,000 births, SAE 1,234,567, 100 births/s, 30s left");
+    }
+
+    #[test]
+    fn the_time_left_ends_with_the_time_limit() {
+        let limited = Standing { time_limit: Some(Duration::from_secs(15)), ..standing() };
+        assert_eq!(limited.eta_s(), 5.0);
+        assert_eq!(short_time(standing().eta_s()), "30s");
+        assert_eq!(short_time(129.5), "2m10s");
+        assert_eq!(short_time(11_100.0), "3h05m");
+    }
+
+    #[test]
+    fn a_line_of_json_has_numbers_only() {
+        let line: serde_json::Value = serde_json::from_str(&standing().json_line()).expect("it is JSON");
+        assert_eq!(line["births"], 1_000);
+        assert_eq!(line["eta_s"], 30.0);
+    }
+}

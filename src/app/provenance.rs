@@ -1,0 +1,175 @@
+//! How a result came to be: everything that decides it, the key made from that, and the metadata in every output.
+//!
+//! Only what decides the result is told: never the device, driver, threads, paths, host or time. So the same command
+//! writes the same bytes everywhere, and the key tells whether a file is what a command would write.
+
+use serde_json::{Map, Value, json};
+use sha2::{Digest, Sha256};
+
+use super::destination::{Content, Destination};
+use super::job::Job;
+use super::options::EvolveOptions;
+use super::report::Status;
+use crate::archive;
+use crate::error::Result;
+use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
+use crate::model::Population;
+use crate::photo::{self, Metadata};
+
+/// The program's name in metadata.
+const SOFTWARE: &str = "smalti";
+/// Keyword of the text chunk or comment that holds the metadata as JSON.
+const KEYWORD: &str = "smalti";
+/// What the header of a population file already tells.
+const HEADER_KEYS: [&str; 3] = ["width_px", "height_px", "background"];
+
+/// Everything that decides a result.
+#[derive(Clone, Debug)]
+pub(super) struct Provenance {
+    decisive: Map<String, Value>,
+    key: String,
+}
+
+/// How an evolution ended, as its outputs tell it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ending {
+    pub status: Status,
+    pub stop: StopReason,
+    pub sae: u64,
+    pub outcome: Outcome,
+}
+
+impl Ending {
+    /// How `evolution`, which has ended, ended.
+    pub(super) fn of(evolution: &Evolution) -> Self {
+        let stop = evolution.stop_reason().unwrap_or(StopReason::Births);
+        let status = if stop == StopReason::Interrupted { Status::Partial } else { Status::Complete };
+        Self { status, stop, sae: evolution.best_sae().unwrap_or_default(), outcome: evolution.outcome() }
+    }
+}
+
+impl Provenance {
+    /// What decides a mosaic.
+    pub(super) fn of_mosaic(options: &EvolveOptions, job: &Job) -> Self {
+        let scheme = &options.scheme;
+        Self::new(
+            job,
+            json!({
+                "content": "mosaic",
+                "algorithm": ALGORITHM_VERSION,
+                "tiles": job.fly_count,
+                "init_sha256": job.init.as_ref().map(population_sha256),
+                "scheme": "paper",
+                "seed": scheme.seed,
+                "births_per_run": scheme.births,
+                "batch_births": scheme.batch_births,
+                "restarts": scheme.restarts,
+                "cool_q16": scheme.cool_q16,
+                "on_dry": on_dry_name(scheme.on_dry),
+                "patience": scheme.patience,
+                "target_sae": scheme.target_sae,
+                "time_ms": options.time_limit.map(|limit| limit.as_millis() as u64),
+                "output_size_px": options.output_long_side_px,
+            }),
+        )
+    }
+
+    /// What decides the fitted picture.
+    pub(super) fn of_target(job: &Job) -> Self {
+        Self::new(job, json!({ "content": "target" }))
+    }
+
+    fn new(job: &Job, specific: Value) -> Self {
+        let mut decisive = Map::new();
+        decisive.insert("input_sha256".to_owned(), job.input_sha256.clone().into());
+        decisive.insert("width_px".to_owned(), job.target.width_px().into());
+        decisive.insert("height_px".to_owned(), job.target.height_px().into());
+        decisive.insert("background".to_owned(), hexadecimal(&job.background).into());
+        if let Value::Object(specific) = specific {
+            decisive.extend(specific);
+        }
+        // The order of the keys must not depend on the map that holds them.
+        decisive.sort_keys();
+        let key = hexadecimal(&Sha256::digest(Value::Object(decisive.clone()).to_string()));
+        Self { decisive, key }
+    }
+
+    /// SHA-256 over everything that decides the result, 64 lower-case hexadecimal digits.
+    pub(super) fn key(&self) -> &str {
+        &self.key
+    }
+
+    /// The metadata as one JSON object: what decides the result, its key, and how the evolution ended.
+    pub(super) fn describe(&self, ending: Option<&Ending>) -> Map<String, Value> {
+        let mut told = self.decisive.clone();
+        told.insert("software".to_owned(), SOFTWARE.into());
+        told.insert("version".to_owned(), env!("CARGO_PKG_VERSION").into());
+        told.insert("key".to_owned(), self.key.clone().into());
+        if let Some(Ending { status, stop, sae, outcome }) = ending {
+            told.insert("status".to_owned(), json!(status));
+            told.insert("stop".to_owned(), stop.word().into());
+            told.insert("sae".to_owned(), (*sae).into());
+            told.insert("births".to_owned(), outcome.births.into());
+            told.insert("fallback_kills".to_owned(), outcome.fallback_kills.into());
+            told.insert("restarts_made".to_owned(), outcome.restarts.into());
+        }
+        told.sort_keys();
+        told
+    }
+
+    /// The metadata of a picture file.
+    pub(super) fn picture_metadata(&self, ending: Option<&Ending>) -> Metadata {
+        let software = format!("{SOFTWARE} {}", env!("CARGO_PKG_VERSION"));
+        let told = Value::Object(self.describe(ending)).to_string();
+        vec![("Software".to_owned(), software), (KEYWORD.to_owned(), told)]
+    }
+
+    /// The metadata of a population file, without what its header tells anyway.
+    pub(super) fn population_metadata(&self, ending: &Ending) -> Map<String, Value> {
+        let mut told = self.describe(Some(ending));
+        told.retain(|key, _| !HEADER_KEYS.contains(&key.as_str()));
+        told
+    }
+}
+
+/// The key in the file at a destination, if smalti wrote it.
+pub(super) fn key_of_file(destination: &Destination) -> Option<String> {
+    let told = match destination.content {
+        Content::Population => archive::read_meta(&destination.path).ok()?,
+        Content::Png | Content::Jpeg => picture_description(photo::read_metadata(&destination.path)).ok()??,
+    };
+    let is_ours = told.get("software").and_then(Value::as_str) == Some(SOFTWARE);
+    told.get("key").and_then(Value::as_str).filter(|_| is_ours).map(str::to_owned)
+}
+
+fn picture_description(metadata: Result<Metadata>) -> Result<Option<Map<String, Value>>> {
+    let told = metadata?.into_iter().find(|(keyword, _)| keyword == KEYWORD);
+    Ok(told.and_then(|(_, text)| serde_json::from_str(&text).ok()))
+}
+
+fn on_dry_name(on_dry: OnDry) -> &'static str {
+    match on_dry {
+        OnDry::Fallback => "fallback",
+        OnDry::Restart => "restart",
+        OnDry::Stop => "stop",
+    }
+}
+
+/// SHA-256 over what evolves from a population: its flies and masks, whatever file held them.
+fn population_sha256(population: &Population) -> String {
+    let mut hash = Sha256::new();
+    for fly in &population.flies {
+        let genes = [fly.x as u32, fly.y as u32, fly.z, fly.w, fly.h];
+        let channels = [fly.r, fly.g, fly.b, fly.angle, fly.mask, u16::from(fly.alive)];
+        genes.iter().for_each(|gene| hash.update(gene.to_le_bytes()));
+        channels.iter().for_each(|channel| hash.update(channel.to_le_bytes()));
+    }
+    for mask in population.masks.layers() {
+        hash.update(bytemuck::cast_slice(mask.texels()));
+    }
+    hexadecimal(&hash.finalize())
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,244 @@
+//! What is said at the end: the summary for people, the row of JSON for programs, and failures for both.
+
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use indicatif::{BinaryBytes, HumanCount};
+use serde::Serialize;
+
+use super::interrupt::EXIT_INTERRUPTED;
+use super::job::Job;
+use super::options::{EvolveOptions, Verbosity};
+use crate::error::{Error, Result};
+use crate::evolve::Evolution;
+use crate::model::{Mosaic, Target};
+
+/// What became of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Status {
+    /// Evolved to the end.
+    Complete,
+    /// Interrupted; the outputs hold the best so far.
+    Partial,
+    /// Not evolved: only a dry run.
+    Planned,
+    /// Nothing was written.
+    Failed,
+}
+
+/// The result of one picture; the same fields for one picture and in a batch.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Row {
+    /// The input's file name without its ending.
+    pub id: String,
+    pub status: Status,
+    /// Why the evolution ended.
+    pub stop: Option<&'static str>,
+    /// The files that were written, or would be.
+    pub output: Vec<String>,
+    /// SHA-256 over all that decides the result.
+    pub key: Option<String>,
+    pub seed: u64,
+    pub scheme: &'static str,
+    pub sae: Option<u64>,
+    /// What was minimised: the SAE.
+    pub objective: Option<u64>,
+    /// Peak signal-to-noise ratio in dB; none for a perfect likeness, whose ratio is infinite.
+    pub psnr: Option<f64>,
+    pub tiles: Option<usize>,
+    pub births: u64,
+    /// Candidates that were evaluated.
+    pub evals: u64,
+    pub fallback_kills: u64,
+    /// Restarts made.
+    pub restarts: u32,
+    pub load_ms: f64,
+    pub evolve_ms: f64,
+    pub save_ms: f64,
+    pub device: Option<String>,
+    /// Part of a batch that this process did.
+    pub shard: Option<String>,
+    pub host: Option<String>,
+    pub version: &'static str,
+    /// Why it failed.
+    pub error: Option<String>,
+}
+
+impl Row {
+    /// The row of a picture about which nothing is known yet.
+    pub(super) fn new(input: &Path, seed: u64) -> Self {
+        Self {
+            id: input.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            status: Status::Failed,
+            stop: None,
+            output: Vec::new(),
+            key: None,
+            seed,
+            scheme: "paper",
+            sae: None,
+            objective: None,
+            psnr: None,
+            tiles: None,
+            births: 0,
+            evals: 0,
+            fallback_kills: 0,
+            restarts: 0,
+            load_ms: 0.0,
+            evolve_ms: 0.0,
+            save_ms: 0.0,
+            device: None,
+            shard: None,
+            host: host_name(),
+            version: env!("CARGO_PKG_VERSION"),
+            error: None,
+        }
+    }
+
+    /// Takes in how an evolution ended.
+    pub(super) fn note_evolution(&mut self, evolution: &Evolution) {
+        let outcome = evolution.outcome();
+        self.stop = evolution.stop_reason().map(crate::evolve::StopReason::word);
+        self.sae = evolution.best_sae();
+        self.objective = self.sae;
+        self.births = outcome.births;
+        self.evals = outcome.births;
+        self.fallback_kills = outcome.fallback_kills;
+        self.restarts = outcome.restarts;
+    }
+
+    /// Takes in why there is no result.
+    pub(super) fn note_failure(&mut self, error: &Error) {
+        self.status = Status::Failed;
+        self.output.clear();
+        self.error = Some(error.to_string());
+    }
+
+    /// Prints the row to stdout.
+    pub(super) fn print(&self) -> Result<()> {
+        print_json(self)
+    }
+
+    /// The exit code of the process.
+    pub(super) fn exit_code(&self) -> u8 {
+        if self.status == Status::Partial { EXIT_INTERRUPTED } else { 0 }
+    }
+}
+
+/// Milliseconds with three decimals.
+pub(super) fn milliseconds(duration: Duration) -> f64 {
+    duration.as_micros() as f64 / 1e3
+}
+
+/// Peak signal-to-noise ratio in dB over all channels; `None` if the pictures are equal.
+pub(super) fn psnr_db(mosaic: &Mosaic, target: &Target) -> Option<f64> {
+    let squares: u64 = differences(mosaic, target).map(|difference| difference.pow(2)).sum();
+    let channel_count = mosaic.pixels.len() as f64 * 3.0;
+    (squares > 0).then(|| 10.0 * (255.0_f64.powi(2) * channel_count / squares as f64).log10())
+}
+
+/// Sum of absolute errors between a mosaic at evaluation size and its target.
+pub(super) fn sum_of_errors(mosaic: &Mosaic, target: &Target) -> u64 {
+    differences(mosaic, target).sum()
+}
+
+/// The absolute difference of each channel of each pixel.
+fn differences(mosaic: &Mosaic, target: &Target) -> impl Iterator<Item = u64> {
+    let pairs = mosaic.pixels.as_flattened().iter().zip(target.pixels().as_flattened());
+    pairs.map(|(&drawn, &wanted)| u64::from(drawn.abs_diff(wanted)))
+}
+
+/// The summary of a finished evolution.
+pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
+    let count = |value: u64| HumanCount(value).to_string();
+    let sae = row.sae.unwrap_or_default();
+    let mean_error = sae as f64 / (job.target.pixels().len() as f64 * 3.0);
+    let psnr = row.psnr.map_or("infinite PSNR".to_owned(), |db| format!("PSNR {db:.2} dB"));
+    let seconds = row.evolve_ms / 1e3;
+    let births_per_s = (row.births as f64 / seconds.max(1e-6)) as u64;
+    say(&format!("{}, {} tiles", size_line(options, job), count(job.fly_count as u64)));
+    say(&format!("SAE {}, mean error {mean_error:.2} of 255 per channel, {psnr}", count(sae)));
+    say(&format!(
+        "{} births ({} by the fallback), {} restarts, {seconds:.2} s, {} births/s on {}",
+        count(row.births),
+        count(row.fallback_kills),
+        count(u64::from(row.restarts)),
+        count(births_per_s),
+        row.device.as_deref().unwrap_or_default()
+    ));
+    say(&format!("seed {}, stopped by {}", row.seed, row.stop.unwrap_or_default()));
+    if options.verbosity == Verbosity::Verbose {
+        say(&format!("read in {:.0} ms, encoded and written in {:.0} ms", row.load_ms, row.save_ms));
+        say(&format!("SHA-256 of the input {}", job.input_sha256));
+        say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
+    }
+    let partial = if row.status == Status::Partial { " (partial: run the same command again)" } else { "" };
+    say(&format!("wrote {}{partial}", row.output.join(", ")));
+}
+
+/// What a dry run says.
+pub(super) fn print_plan(row: &Row, options: &EvolveOptions, job: &Job, memory_bytes: u64) {
+    let scheme = &options.scheme;
+    let runs = u64::from(scheme.restarts) + 1;
+    let begin = options.init.as_ref().map_or("random".to_owned(), |path| path.display().to_string());
+    say(&size_line(options, job));
+    say(&format!("tiles      {} from {begin}", HumanCount(job.fly_count as u64)));
+    say(&format!(
+        "births     {} in each of {runs} runs, {} at a time, scheme {}, seed {}",
+        HumanCount(scheme.births),
+        scheme.batch_births,
+        row.scheme,
+        row.seed
+    ));
+    if let Some(limit) = options.time_limit {
+        say(&format!("time       at most {} s", limit.as_secs_f64()));
+    }
+    say(&format!("memory     about {}", BinaryBytes(memory_bytes)));
+    say(&format!("device     {}", row.device.as_deref().unwrap_or_default()));
+    say(&format!("would write {}", row.output.join(", ")));
+    say(&format!("key        {}", row.key.as_deref().unwrap_or_default()));
+}
+
+/// The input with its sizes: as read, and as evolved if that is smaller.
+fn size_line(options: &EvolveOptions, job: &Job) -> String {
+    let (width_px, height_px) = job.original_size_px;
+    let fitted = (job.target.width_px(), job.target.height_px());
+    let reduced =
+        if fitted == job.original_size_px { String::new() } else { format!(", reduced to {}x{}", fitted.0, fitted.1) };
+    format!("{}: {width_px}x{height_px} px{reduced}", options.input.display())
+}
+
+/// Prints a value as one line of JSON to stdout.
+pub(super) fn print_json(value: &impl Serialize) -> Result<()> {
+    let mut line = serde_json::to_vec(value).map_err(|error| Error::Internal(format!("no JSON: {error}")))?;
+    line.push(b'\n');
+    write_stdout(&line)
+}
+
+/// Writes to stdout. That nobody reads on is no failure: the reader has what it wants.
+pub(super) fn write_stdout(bytes: &[u8]) -> Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Error::output(Path::new("stdout"), format!("cannot be written ({error})")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Prints a line to stderr; if that fails there is nowhere left to say so.
+pub(super) fn say(line: &str) {
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Prints a failure.
+pub(super) fn error(sentence: &str) {
+    say(&format!("smalti: {sentence}"));
+}
+
+/// The name of this machine.
+fn host_name() -> Option<String> {
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| std::env::var("HOSTNAME"));
+    name.ok().map(|name| name.trim().to_owned()).filter(|name| !name.is_empty())
+}

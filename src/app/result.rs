@@ -1,0 +1,138 @@
+//! The result of an evolution: drawn, checked against what was reported, encoded, written.
+
+use super::destination::{Content, Destination};
+use super::job::Job;
+use super::options::{EvolveOptions, Verbosity};
+use super::provenance::{Ending, Provenance};
+use super::report;
+use crate::archive;
+use crate::error::{Error, Result};
+use crate::model::target::TARGET_SIDE_MAX_PX;
+use crate::model::{Canvas, Evaluator, Mosaic, Population};
+use crate::output;
+use crate::photo::{self, Photo};
+
+/// Quality of JPEG outputs, 1 to 100.
+const JPEG_QUALITY: u8 = 92;
+/// Most samples along each side of a pixel of an enlarged picture.
+const SUPERSAMPLING_MAX: u32 = 4;
+
+/// What an evolution led to.
+#[derive(Debug)]
+pub(super) struct Evolved {
+    pub ending: Ending,
+    /// The best population.
+    pub population: Population,
+    /// Marginal fitness of its flies.
+    pub marginal: Vec<i64>,
+    /// The best population as it was scored.
+    pub mosaic: Mosaic,
+    /// The same at the size that was asked for, if it is another.
+    pub resized: Option<Mosaic>,
+}
+
+/// A file that is ready to be written.
+pub(super) struct EncodedFile<'a> {
+    destination: &'a Destination,
+    bytes: Vec<u8>,
+}
+
+/// Draws the best population, which the evaluator holds in lane 0, at evaluation size and at the size asked for.
+///
+/// # Errors
+/// If the device fails, or if the mosaic is not what was scored.
+pub(super) fn draw(
+    evaluator: &mut dyn Evaluator,
+    options: &EvolveOptions,
+    population: Population,
+    ending: Ending,
+) -> Result<Evolved> {
+    let evaluation = evaluator.evaluation(0);
+    let (scored, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
+    let (width_px, height_px) = (population.width_px, population.height_px);
+    let mosaic = evaluator.draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
+    let drawn = report::sum_of_errors(&mosaic, &evaluator.scene(0).target);
+    if scored != ending.sae || drawn != ending.sae {
+        return Err(Error::Internal(format!(
+            "the best population had an SAE of {}, is evaluated to {scored} and drawn with {drawn}",
+            ending.sae
+        )));
+    }
+    let long_side_px = options.output_long_side_px.filter(|&long| long != width_px.max(height_px));
+    let resized = match long_side_px {
+        Some(long) if options.outputs.iter().any(Destination::is_picture) => {
+            let canvas = Canvas::scaled(width_px, height_px, long);
+            if options.verbosity > Verbosity::Quiet {
+                report::say(&format!("drawing {}x{} px", canvas.width_px, canvas.height_px));
+            }
+            Some(evaluator.draw(&population, &canvas, supersampling(long))?)
+        }
+        _ => None,
+    };
+    Ok(Evolved { ending, population, marginal, mosaic, resized })
+}
+
+/// As many samples along each side of a pixel as the largest canvas allows.
+fn supersampling(long_side_px: u32) -> u32 {
+    (1..=SUPERSAMPLING_MAX).rev().find(|factor| long_side_px * factor <= TARGET_SIDE_MAX_PX).unwrap_or(1)
+}
+
+/// The outputs as bytes; nothing is written before all of them are there.
+pub(super) fn encode<'a>(
+    options: &'a EvolveOptions,
+    evolved: Evolved,
+    provenance: &Provenance,
+) -> Result<Vec<EncodedFile<'a>>> {
+    let Mosaic { width_px, height_px, pixels } = evolved.resized.unwrap_or(evolved.mosaic);
+    let photo = Photo { width_px, height_px, pixels };
+    let metadata = provenance.picture_metadata(Some(&evolved.ending));
+    let encode_one = |destination: &'a Destination| {
+        let bytes = match destination.content {
+            Content::Png => photo::encode_png(&photo, &metadata),
+            Content::Jpeg => photo::encode_jpeg(&photo, JPEG_QUALITY, &metadata),
+            Content::Population => {
+                let told = provenance.population_metadata(&evolved.ending);
+                archive::encode(&evolved.population, &evolved.marginal, &told)
+            }
+        }?;
+        Ok(EncodedFile { destination, bytes })
+    };
+    options.outputs.iter().map(encode_one).collect()
+}
+
+/// The file of `--save-target`, if it was asked for.
+pub(super) fn encode_target<'a>(
+    options: &'a EvolveOptions,
+    job: &Job,
+    provenance: &Provenance,
+) -> Result<Option<EncodedFile<'a>>> {
+    let Some(destination) = &options.save_target else { return Ok(None) };
+    let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
+    let photo = Photo { width_px, height_px, pixels: job.target.pixels().to_vec() };
+    let bytes = photo::encode_png(&photo, &provenance.picture_metadata(None))?;
+    Ok(Some(EncodedFile { destination, bytes }))
+}
+
+/// Writes the files one after the other, each in one step.
+pub(super) fn write(files: &[EncodedFile<'_>]) -> Result<()> {
+    files.iter().try_for_each(|EncodedFile { destination, bytes }| {
+        if destination.is_stdout() {
+            report::write_stdout(bytes)
+        } else {
+            output::write_atomically(&destination.path, bytes)
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::supersampling;
+
+    #[test]
+    fn supersampling_is_reduced_where_the_canvas_would_be_too_large() {
+        assert_eq!(
+            [1, 4_096, 16_383, 16_384, 21_845, 32_767, 32_768, 65_535].map(supersampling),
+            [4, 4, 4, 3, 3, 2, 1, 1]
+        );
+    }
+}

@@ -1,0 +1,164 @@
+//! `smalti evolve`: from options to written files.
+
+use std::process::ExitCode;
+use std::time::Instant;
+
+use super::cli::EvolveArgs;
+use super::device::{self, Opened, Selected};
+use super::interrupt::Interrupt;
+use super::job::Job;
+use super::options::{EvolveOptions, Mode, Verbosity};
+use super::progress::Progress;
+use super::provenance::{Ending, Provenance};
+use super::report::{self, Row, Status};
+use super::result::Evolved;
+use super::watch::Watch;
+use super::{destination, memory, result};
+use crate::engine::Engine;
+use crate::error::{Error, Result};
+use crate::evolve::Evolution;
+use crate::model::{Canvas, Population};
+use crate::vk::ValidationLog;
+
+/// Evolves one picture and reports about it; the exit code of the process.
+pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
+    let mut row = Row::new(&args.input, args.seed);
+    let done = EvolveOptions::new(args).and_then(|options| evolve_picture(&options, &mut row));
+    if let Err(error) = &done {
+        row.note_failure(error);
+        report::error(&error.to_string());
+    }
+    let printed = if args.json { row.print() } else { Ok(()) };
+    match done.and(printed) {
+        Ok(()) => ExitCode::from(row.exit_code()),
+        Err(error) => ExitCode::from(error.exit_code()),
+    }
+}
+
+/// The work, in order: check, read, evolve and draw, encode and write.
+fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
+    let interrupt = Interrupt::listen()?;
+    start_threads(options.threads)?;
+    destination::check_writable(options.destinations(), &options.input)?;
+    let selected = device::select(&options.device, options.validation)?;
+    row.device = Some(selected.label().to_owned());
+
+    let began = Instant::now();
+    let job = Job::load(options)?;
+    row.load_ms = report::milliseconds(began.elapsed());
+    row.tiles = Some(job.fly_count);
+    if options.verbosity > Verbosity::Quiet {
+        say_notes(&job, options, &selected);
+    }
+    let provenance = Provenance::of_mosaic(options, &job);
+    let target_provenance = Provenance::of_target(&job);
+    row.key = Some(provenance.key().to_owned());
+    row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
+    let memory_bytes = check_job(options, &job)?;
+    check_replaceable(options, &provenance, &target_provenance)?;
+    if options.mode == Mode::DryRun {
+        row.status = Status::Planned;
+        report::print_plan(row, options, &job, memory_bytes);
+        return Ok(());
+    }
+
+    let evolved = evolve_job(options, &job, selected, &interrupt, row)?;
+    let began = Instant::now();
+    let status = evolved.ending.status;
+    let mut files = result::encode(options, evolved, &provenance)?;
+    files.extend(result::encode_target(options, &job, &target_provenance)?);
+    interrupt.while_writing(|| result::write(&files))?;
+    row.save_ms = report::milliseconds(began.elapsed());
+    row.status = status;
+    if options.verbosity > Verbosity::Quiet {
+        report::print_summary(row, options, &job);
+    }
+    Ok(())
+}
+
+/// Gives the CPU twin as many threads as were asked for.
+fn start_threads(count: Option<usize>) -> Result<()> {
+    let Some(count) = count else { return Ok(()) };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(count)
+        .build_global()
+        .map_err(|error| Error::Usage(format!("--threads {count}: the threads cannot be started ({error})")))
+}
+
+/// Checks what depends on the picture's size; returns about how many bytes the work needs.
+fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
+    let batch_births = options.scheme.batch_births as usize;
+    if batch_births > job.fly_count {
+        return Err(Error::Usage(format!(
+            "--batch-births {batch_births}: must be at most the number of tiles, {}",
+            job.fly_count
+        )));
+    }
+    let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
+    let pixel_count = u64::from(width_px) * u64::from(height_px);
+    let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
+    let output_pixel_count =
+        output.map_or(pixel_count, |canvas| u64::from(canvas.width_px) * u64::from(canvas.height_px));
+    let needed_bytes = memory::estimate_bytes(pixel_count, job.fly_count, output_pixel_count);
+    memory::check(needed_bytes)?;
+    Ok(needed_bytes)
+}
+
+/// Refuses to replace files that are not what this command would write.
+fn check_replaceable(options: &EvolveOptions, mosaic: &Provenance, target: &Provenance) -> Result<()> {
+    let outputs = options.outputs.iter().map(|output| (output, mosaic.key()));
+    let targets = options.save_target.iter().map(|output| (output, target.key()));
+    outputs.chain(targets).try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))
+}
+
+/// Says what somebody should know before the work begins.
+fn say_notes(job: &Job, options: &EvolveOptions, selected: &Selected) {
+    for warning in &job.warnings {
+        report::say(&format!("smalti: {}: {warning}", options.input.display()));
+    }
+    if let Selected::Cpu { reason: Some(reason) } = selected {
+        report::say(&format!("smalti: the CPU twin does the work, since {reason}"));
+    }
+}
+
+/// Evolves the job and draws its best population; the device is closed before it returns.
+fn evolve_job(
+    options: &EvolveOptions,
+    job: &Job,
+    selected: Selected,
+    interrupt: &Interrupt,
+    row: &mut Row,
+) -> Result<Evolved> {
+    let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
+    let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
+    let first_flies = job.first_flies(options.scheme.seed);
+    let evolution = Evolution::new(options.scheme.clone(), 0, width_px, height_px, first_flies);
+    let mut engine = Engine::new(evaluator, vec![evolution]);
+    let mut watch = Watch::begin(interrupt, options.time_limit, Progress::new(options.progress));
+    let ran = engine.run(&mut watch);
+    row.evolve_ms = report::milliseconds(watch.finish());
+    ran?;
+    let evolution = &engine.evolutions()[0];
+    row.note_evolution(evolution);
+    let ending = Ending::of(evolution);
+    let population = Population {
+        width_px,
+        height_px,
+        background: job.background,
+        masks: job.masks(),
+        flies: evolution.best_flies().to_vec(),
+    };
+    let evolved = result::draw(engine.evaluator(), options, population, ending)?;
+    row.psnr = report::psnr_db(&evolved.mosaic, &job.target);
+    drop(engine);
+    validation_log.map_or(Ok(()), |log| check_messages(&log))?;
+    Ok(evolved)
+}
+
+/// Turns what the validation layer said into an error.
+fn check_messages(log: &ValidationLog) -> Result<()> {
+    let messages = log.messages();
+    let Some(first) = messages.first() else { return Ok(()) };
+    let first = first.split_whitespace().collect::<Vec<_>>().join(" ");
+    Err(Error::Validation(format!("{first} ({} messages in all)", messages.len())))
+}

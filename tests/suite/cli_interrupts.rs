@@ -1,0 +1,80 @@
+//! Signals: the first ends the evolution in order, the second Ctrl-C ends the process at once.
+
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, ExitStatus};
+
+use crate::workshop::Workshop;
+
+const ENDLESS: &str = "evolve photo.png -n 60 --births 1000000M --progress json";
+
+fn send(signal: &str, child: &Child) {
+    let status = Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status().unwrap();
+    assert!(status.success(), "the signal is sent");
+}
+
+/// Starts the program, sends the signals once it is evolving, and returns its end with the rest of its messages.
+fn interrupted(workshop: &Workshop, line: &str, signals: &[&str]) -> (ExitStatus, String) {
+    let mut child = workshop.command(line).spawn().unwrap();
+    let mut messages = BufReader::new(child.stderr.take().unwrap());
+    let mut text = String::new();
+    messages.read_line(&mut text).unwrap();
+    for signal in signals {
+        send(signal, &child);
+        // So that two of a kind do not become one.
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    messages.read_to_string(&mut text).unwrap();
+    (child.wait().unwrap(), text)
+}
+
+fn status_of(workshop: &Workshop, name: &str) -> String {
+    let archive = smalti::archive::read(&workshop.path(name)).unwrap();
+    archive.meta["status"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn every_signal_that_asks_for_an_end_leaves_the_best_so_far_marked_as_partial() {
+    for signal in ["INT", "TERM", "USR1"] {
+        let workshop = Workshop::new();
+        let (status, messages) = interrupted(&workshop, &format!("{ENDLESS} -o a.png -o a.npz"), &[signal]);
+        assert_eq!(status.code(), Some(75), "{signal}: {messages}");
+        assert!(messages.contains("partial"), "{messages}");
+        assert_eq!(workshop.pixels("a.png").dimensions(), (40, 30));
+        assert_eq!(status_of(&workshop, "a.npz"), "partial");
+        assert_eq!(workshop.files().len(), 3, "{:?}", workshop.files());
+    }
+}
+
+#[test]
+fn the_same_command_may_replace_a_partial_result_and_another_may_not() {
+    let workshop = Workshop::new();
+    let command = format!("{ENDLESS} -o a.npz");
+    assert_eq!(interrupted(&workshop, &command, &["INT"]).0.code(), Some(75));
+    let other = workshop.run(&format!("{command} --seed 1"));
+    assert_eq!(other.code, Some(2), "{}", other.stderr);
+    assert_eq!(interrupted(&workshop, &command, &["INT"]).0.code(), Some(75));
+}
+
+#[test]
+fn a_partial_result_has_a_row_that_says_so() {
+    let workshop = Workshop::new();
+    let mut child = workshop.command(&format!("{ENDLESS} -o a.png --json")).spawn().unwrap();
+    BufReader::new(child.stderr.as_mut().unwrap()).read_line(&mut String::new()).unwrap();
+    send("INT", &child);
+    let mut text = String::new();
+    child.stdout.as_mut().unwrap().read_to_string(&mut text).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    let row: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!([&row["status"], &row["stop"]], ["partial", "interrupted"]);
+    assert!(row["births"].as_u64() > Some(0) && row["error"].is_null());
+}
+
+#[test]
+fn the_second_ctrl_c_ends_the_process_at_once_and_leaves_nothing() {
+    let workshop = Workshop::new();
+    let before = workshop.files();
+    // Large enough that drawing and encoding are still going on when the second one comes.
+    let (status, messages) = interrupted(&workshop, &format!("{ENDLESS} -o a.png --output-size 8000"), &["INT", "INT"]);
+    assert_eq!(status.code(), Some(130), "{messages}");
+    assert_eq!(workshop.files(), before);
+}

@@ -1,0 +1,170 @@
+//! Bad input at the command line: one sentence, the right exit code, and nothing left behind.
+
+use crate::workshop::{Ran, Workshop};
+
+/// Runs the program, which must fail with `code` and one sentence that holds `words`, and leave no file.
+fn refused(workshop: &Workshop, line: &str, code: i32, words: &str) -> Ran {
+    let before = workshop.files();
+    let ran = workshop.run(line);
+    assert_eq!(ran.code, Some(code), "{line}: {}", ran.stderr);
+    let sentence = ran.stderr.strip_prefix("smalti: ").unwrap_or_else(|| panic!("{line}: {:?}", ran.stderr));
+    assert_eq!(sentence.lines().count(), 1, "{line}: {sentence}");
+    assert!(sentence.contains(words), "{line}: {words:?} is not in {sentence:?}");
+    assert_eq!(workshop.files(), before, "{line} left something behind");
+    ran
+}
+
+#[test]
+fn inputs_that_are_no_picture_are_refused_by_name() {
+    let workshop = Workshop::new();
+    workshop.paint("whole.png", 64, 64);
+    workshop.paint("whole.jpg", 64, 64);
+    let (png, jpeg) = (workshop.read("whole.png"), workshop.read("whole.jpg"));
+    workshop.write("cut.png", &png[..png.len() / 2]);
+    workshop.write("cut.jpg", &jpeg[..jpeg.len() / 2]);
+    workshop.write("empty.png", b"");
+    workshop.write("text.png", b"This is no picture, whatever its name says.");
+    workshop.write("bomb.png", &png_header(60_000, 60_000));
+    workshop.write("flat.png", &png_header(0, 5));
+    std::fs::create_dir(workshop.path("folder")).unwrap();
+    for name in
+        ["missing.png", "folder", "cut.png", "cut.jpg", "empty.png", "text.png", "bomb.png", "flat.png", "photo.png/x"]
+    {
+        refused(&workshop, &format!("evolve {name} -o out.png"), 2, name);
+    }
+}
+
+/// The start of a PNG file that claims to have this size.
+fn png_header(width_px: u32, height_px: u32) -> Vec<u8> {
+    let mut header = b"IHDR".to_vec();
+    header.extend(width_px.to_be_bytes());
+    header.extend(height_px.to_be_bytes());
+    header.extend([8, 2, 0, 0, 0]);
+    let mut file = b"\x89PNG\r\n\x1a\n\0\0\0\x0d".to_vec();
+    file.extend(&header);
+    file.extend(crc32(&header).to_be_bytes());
+    file
+}
+
+fn crc32(bytes: &[u8]) -> u32 {
+    let step = |crc: u32, _| if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 };
+    !bytes.iter().fold(!0, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), step))
+}
+
+#[test]
+fn values_out_of_range_are_refused_with_their_flag() {
+    let workshop = Workshop::new();
+    for (rest, words) in [
+        ("-n 0", "--tiles 0"),
+        ("-n 1000001", "--tiles 1000001"),
+        ("-n many", "--tiles"),
+        ("-n -3", "-3"),
+        ("--size 0", "--size 0"),
+        ("--size 65536", "--size 65536"),
+        ("--output-size 0", "--output-size 0"),
+        ("--births 1.5", "--births"),
+        ("--batch-births 0", "--batch-births 0"),
+        ("-n 60 --batch-births 61", "--batch-births 61"),
+        ("--cool 0.5", "--restarts"),
+        ("--cool 0 --restarts 1", "--cool 0"),
+        ("--cool 1.5 --restarts 1", "--cool 1.5"),
+        ("--cool NaN --restarts 1", "--cool NaN"),
+        ("--patience 0", "--patience 0"),
+        ("--time soon", "--time"),
+        ("--background red", "--background"),
+        ("--threads 0", "--threads 0"),
+        ("--scheme quick", "--scheme"),
+        ("--device gpu", "--device gpu"),
+        ("--validate", "--validate"),
+        ("--sed 1", "--seed"),
+        ("-q -v", "--verbose"),
+    ] {
+        refused(&workshop, &format!("evolve photo.png -o out.png {rest}"), 2, words);
+    }
+    refused(&workshop, "evolve photo.png", 2, "--output");
+}
+
+#[test]
+fn a_device_that_is_not_there_is_no_suitable_device() {
+    let workshop = Workshop::new();
+    for device in ["name:no-such-gpu", "99", "uuid:00000000000000000000000000000000", "pci:ffff:ff:1f.7"] {
+        refused(&workshop, &format!("evolve photo.png -o out.png --device {device}"), 4, device);
+    }
+}
+
+#[test]
+fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
+    let workshop = Workshop::new();
+    std::fs::create_dir(workshop.path("folder.png")).unwrap();
+    let births = "--births 1000M";
+    for (outputs, code, words) in [
+        ("-o out.gif", 2, "out.gif"),
+        ("-o out", 2, "out"),
+        ("-o a.png -o ./a.png", 2, "named twice"),
+        ("-o - -o -", 2, "named twice"),
+        ("-o a.png --save-target a.png", 2, "named twice"),
+        ("-o a.png --save-target a.jpg", 2, "a.jpg"),
+        ("-o photo.png --force", 2, "is the input"),
+        ("-o a.png --save-target ./photo.png --force", 2, "is the input"),
+        ("-o - --json", 2, "stdout"),
+        ("-o nowhere/a.png", 1, "nowhere/a.png"),
+        ("-o folder.png", 1, "folder.png"),
+    ] {
+        refused(&workshop, &format!("evolve photo.png {outputs} {births}"), code, words);
+    }
+}
+
+#[test]
+fn populations_that_do_not_fit_are_refused() {
+    let workshop = Workshop::new();
+    workshop.paint("other.png", 50, 30);
+    workshop.evolve("-o flies.npz");
+    let npz = workshop.read("flies.npz");
+    workshop.write("cut.npz", &npz[..npz.len() / 2]);
+    refused(&workshop, "evolve other.png -o a.png --init flies.npz", 2, "40x30");
+    refused(&workshop, "evolve photo.png -o a.png --init flies.npz --size 20", 2, "20x15");
+    refused(&workshop, "evolve photo.png -o a.png --init flies.npz -n 60", 2, "--tiles");
+    refused(&workshop, "evolve photo.png -o a.png --init photo.png", 2, "photo.png");
+    refused(&workshop, "evolve photo.png -o a.png --init missing.npz", 2, "missing.npz");
+    refused(&workshop, "evolve photo.png -o a.png --init cut.npz", 2, "cut.npz");
+}
+
+#[test]
+fn only_force_replaces_what_the_same_command_would_not_have_written() {
+    let workshop = Workshop::new();
+    let command = "evolve photo.png -n 60 --births 100";
+    for ending in ["png", "jpg", "npz"] {
+        let name = format!("a.{ending}");
+        workshop.write(&name, b"written by somebody else");
+        refused(&workshop, &format!("{command} -o {name}"), 2, &format!("{name} exists and was not made by smalti"));
+        assert_eq!(workshop.read(&name), b"written by somebody else");
+        assert_eq!(workshop.run(&format!("{command} -o {name} --force")).code, Some(0));
+
+        let first = workshop.read(&name);
+        assert_eq!(workshop.run(&format!("{command} -o {name} --threads 1")).code, Some(0), "same key");
+        assert_eq!(workshop.read(&name), first);
+        refused(&workshop, &format!("{command} -o {name} --seed 1"), 2, "made with other options");
+        assert_eq!(workshop.read(&name), first);
+        assert_eq!(workshop.run(&format!("{command} -o {name} --seed 1 --force")).code, Some(0));
+        assert_ne!(workshop.read(&name), first);
+    }
+}
+
+#[test]
+fn a_saved_target_is_replaced_whatever_evolved_towards_it() {
+    let workshop = Workshop::new();
+    workshop.evolve("-o a.png --save-target t.png");
+    workshop.evolve("-o b.png --save-target t.png --seed 1");
+    refused(&workshop, "evolve photo.png -o c.png --save-target t.png --size 20", 2, "t.png exists");
+    refused(&workshop, "evolve photo.png -o c.png --save-target a.png", 2, "a.png exists");
+}
+
+#[test]
+fn a_failure_has_a_row_of_json_too() {
+    let workshop = Workshop::new();
+    let ran = refused(&workshop, "evolve missing.png -o a.png --json", 2, "missing.png");
+    let row = ran.row();
+    assert_eq!([&row["id"], &row["status"]], ["missing", "failed"]);
+    assert!(row["error"].as_str().is_some_and(|error| error.starts_with("missing.png: ")), "{row}");
+    assert_eq!(row["output"].as_array().map(Vec::len), Some(0));
+}
