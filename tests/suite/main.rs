@@ -5,6 +5,13 @@
 
 mod canary;
 mod exactness;
+mod layering;
+mod layout;
 mod reference;
 mod scenarios;
+#[path = "../../tools/shader_manifest.rs"]
+mod shader_manifest;
+mod shaders_fresh;
+mod spirv;
 mod vulkan;
+mod vulkan_failures;
