@@ -131,7 +131,7 @@ fn escapes(source: &Source) -> Vec<usize> {
     let mut depth = source.depth;
     let mut escapes = Vec::new();
     for (line, text) in (1..).zip(source.text.lines().map(code)) {
-        // A module inside the file, for tests; by habit nothing follows it.
+        // A module of tests inside the file; clippy lets nothing follow it.
         depth += usize::from(text.trim_start().starts_with("mod ") && text.trim_end().ends_with('{'));
         if text.contains(&"super::".repeat(depth)) {
             escapes.push(line);

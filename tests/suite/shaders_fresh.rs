@@ -77,6 +77,12 @@ fn the_shaders_of_the_tests_are_the_ones_compiled_from_their_sources() {
         .collect();
     let mut files = files_in("tests/golden/vk");
     files.remove("SHA256SUMS");
-    let now = files.iter().map(|file| (file.clone(), sha256(&read(&format!("tests/golden/vk/{file}"))))).collect();
-    assert_eq!(sums, now, "tests/golden/vk/SHA256SUMS names other files or bytes; {RECOMPILE_OF_TESTS}");
+    assert!(
+        sums.keys().eq(&files),
+        "tests/golden/vk/SHA256SUMS does not list the files beside it; {RECOMPILE_OF_TESTS}"
+    );
+    for (file, sum) in sums {
+        let now = sha256(&read(&format!("tests/golden/vk/{file}")));
+        assert_eq!(now, sum, "tests/golden/vk/{file} is not the file of SHA256SUMS; {RECOMPILE_OF_TESTS}");
+    }
 }
