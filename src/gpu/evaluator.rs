@@ -74,6 +74,27 @@ impl GpuEvaluator {
         MosaicPass::create(&self.device, &mut self.recorder, population, &canvas)?.draw_fly_layer(&mut self.recorder)
     }
 
+    /// Evaluates every lane once more from what is loaded: the device's part of [`Evaluator::load`], without binning.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn evaluate_again(&mut self) -> Result<()> {
+        for lane in 0..self.lanes.len() {
+            self.restart_sums(lane)?;
+        }
+        self.run(&(0..self.lanes.len()).collect::<Vec<_>>(), FLAG_FRESH)
+    }
+
+    /// Zeroes the sums of a lane and marks all its blocks as stale.
+    fn restart_sums(&mut self, lane: usize) -> Result<()> {
+        let (offset, bytes) = marginal_range(&self.pass.spans[lane]);
+        self.recorder.write_buffer(&self.pass.marginal, offset, &vec![0; bytes as usize])?;
+        self.recorder.write_buffer(&self.pass.sums, lane as u64 * 8, &[0; 8])?;
+        let blocks = 0..self.lanes[lane].lists().block_count() as u32;
+        self.work.pending.extend(blocks.map(|block| Pending { lane, block, from: 0 }));
+        Ok(())
+    }
+
     /// Evaluates all pending blocks and reads the fitness of `lanes` back.
     fn run(&mut self, lanes: &[usize], first_flags: u32) -> Result<()> {
         let mut pending = std::mem::take(&mut self.work.pending);
@@ -202,11 +223,7 @@ impl Evaluator for GpuEvaluator {
             let tile_bytes = size_of::<Tile>() as u64;
             let first_byte = span.first_fly as u64 * tile_bytes;
             self.recorder.write_buffer(&self.pass.tiles, first_byte, bytemuck::cast_slice(lane.tiles()))?;
-            let (offset, bytes) = marginal_range(span);
-            self.recorder.write_buffer(&self.pass.marginal, offset, &vec![0; bytes as usize])?;
-            self.recorder.write_buffer(&self.pass.sums, number as u64 * 8, &[0; 8])?;
-            let blocks = 0..lane.lists().block_count() as u32;
-            self.work.pending.extend(blocks.map(|block| Pending { lane: number, block, from: 0 }));
+            self.restart_sums(number)?;
         }
         let lanes: Vec<usize> = populations.iter().map(|&(lane, _)| lane).collect();
         self.run(&lanes, FLAG_FRESH)

@@ -27,9 +27,8 @@ impl GpuEvaluator {
             return Err(Error::TooLarge("re-rendering needs lists that fit a single dispatch".to_owned()));
         }
         let (fly_count, item_count) = (lane.tiles().len() as u32, lists.block_count() as u32);
-        let flies: Vec<_> = lane.flies().to_vec();
         // The work of a full evaluation stays in the buffers.
-        self.load(&[(0, &flies)])?;
+        self.evaluate_again()?;
 
         let bytes = u64::from(fly_count) * 8;
         let sums = Buffer::create(&self.device, "re-render sums", bytes, BufferUse::Storage, Residence::Device)?;

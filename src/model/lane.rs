@@ -59,12 +59,6 @@ impl Lane {
         &self.scene
     }
 
-    /// The flies, by index.
-    #[must_use]
-    pub fn flies(&self) -> &[Fly] {
-        &self.flies
-    }
-
     /// The baked flies, by index.
     #[must_use]
     pub fn tiles(&self) -> &[Tile] {

@@ -1,13 +1,12 @@
 //! Reducing a picture with Lanczos3.
 //!
-//! Weights are computed in double precision with the sine of `libm`, then rounded to integers; sums are integers. So the
-//! pixels do not depend on the machine, and the SIMD paths of `fast_image_resize` give what its plain path gives (a
-//! test compares them).
+//! The kernel's sine is that of `libm`, and the sums are single-precision floats in a fixed order, without SIMD and
+//! without fused steps, so the pixels do not depend on the machine.
 
 use std::f64::consts::PI;
 
-use fast_image_resize::images::{Image, ImageRef};
-use fast_image_resize::{Filter, FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer};
+use resize::px::RGB;
+use resize::{Filter, Pixel, Resizer, Type};
 
 use super::Photo;
 
@@ -20,15 +19,15 @@ pub(super) fn fit(photo: &Photo, long_side_px: Option<u32>) -> Photo {
     if (width_px, height_px) == (photo.width_px, photo.height_px) {
         return photo.clone();
     }
-    let filter = Filter::new("Lanczos3", lanczos3, SUPPORT).expect("the support is positive");
-    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Custom(filter)));
-    let bytes = bytemuck::cast_slice(&photo.pixels);
-    let source = ImageRef::new(photo.width_px, photo.height_px, bytes, PixelType::U8x3)
-        .expect("a photo has as many pixels as its size says");
-    let mut fitted = Image::new(width_px, height_px, PixelType::U8x3);
-    Resizer::new().resize(&source, &mut fitted, &options).expect("both images have pixels of one type");
-    let (pixels, _) = fitted.buffer().as_chunks::<3>();
-    Photo { width_px, height_px, pixels: pixels.to_vec() }
+    let filter = Filter::new(Box::new(|x| lanczos3(f64::from(x)) as f32), SUPPORT as f32);
+    let [width, height] = [photo.width_px, photo.height_px].map(|side_px| side_px as usize);
+    let (fitted_width, fitted_height) = (width_px as usize, height_px as usize);
+    let source: Vec<RGB<u8>> = photo.pixels.iter().map(|&[r, g, b]| RGB { r, g, b }).collect();
+    let mut fitted = vec![RGB { r: 0_u8, g: 0, b: 0 }; fitted_width * fitted_height];
+    Resizer::new(width, height, fitted_width, fitted_height, Pixel::RGB8, Type::Custom(filter))
+        .and_then(|mut resizer| resizer.resize(&source, &mut fitted))
+        .expect("both pictures have as many pixels as their sizes say");
+    Photo { width_px, height_px, pixels: fitted.into_iter().map(|RGB { r, g, b }| [r, g, b]).collect() }
 }
 
 /// The size in px that fits: the longer side is `long_side_px`, the other is rounded half up, and none is below 1 px.

@@ -102,6 +102,9 @@ const SUBGROUP_NAMES: [(vk::SubgroupFeatureFlags, &str); 8] = [
     (vk::SubgroupFeatureFlags::QUAD, "quad"),
 ];
 
+/// Storage buffers that one stage of our largest pipeline sees.
+const STORAGE_BUFFERS: u32 = 10;
+
 /// Asks the driver everything that [`DeviceInfo`] holds.
 pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> Result<DeviceInfo> {
     // SAFETY: V1.
@@ -139,6 +142,9 @@ pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, ind
     add_modern_properties(instance, handle, &mut info)?;
     add_missing_features(instance, handle, &mut info.missing);
     add_missing_formats(instance, handle, &mut info.missing);
+    if info.limits.storage_buffers_per_stage < STORAGE_BUFFERS {
+        info.missing.push(format!("{STORAGE_BUFFERS} storage buffers per shader stage"));
+    }
     if family.is_none() {
         info.missing.push("a queue for graphics and compute".to_owned());
     }

@@ -188,6 +188,7 @@ mod tests {
             subgroup_operations: Vec::new(),
             limits: DeviceLimits {
                 storage_buffer_bytes: 1 << 27,
+                storage_buffers_per_stage: 16,
                 workgroups: [65_535; 3],
                 workgroup_invocations: 1024,
                 shared_memory_bytes: 1 << 15,
