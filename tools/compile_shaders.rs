@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
 
-use shader_manifest::{Manifest, Module, OPTIONS, STAGES, flattened_source, sha256};
+use shader_manifest::{Manifest, Module, OPTIONS, STAGES, compiler_version, flattened_source, sha256};
 
 fn main() -> ExitCode {
     let check = std::env::args().nth(1).as_deref() == Some("--check");
@@ -36,7 +36,8 @@ fn compile_all(check: bool) -> Result<(), String> {
         });
         settle(check, &format!("spirv/{stage}.spv"), &module)?;
     }
-    let manifest = Manifest { compiler: compiler_version()?, options: OPTIONS.to_owned(), modules };
+    let manifest =
+        Manifest { compiler: compiler_version(Path::new("Cargo.lock"))?, options: OPTIONS.to_owned(), modules };
     let text = serde_json::to_string_pretty(&manifest).map_err(|error| error.to_string())? + "\n";
     settle(check, "spirv/MANIFEST", text.as_bytes())
 }
@@ -65,11 +66,4 @@ fn compile(source: &str, stage: &str) -> Result<Vec<u8>, String> {
     let artifact =
         compiler.compile_into_spirv(source, kind, stage, "main", Some(&options)).map_err(|error| error.to_string())?;
     Ok(artifact.as_binary_u8().to_vec())
-}
-
-/// The shaderc crate of the lock file, whose sources the compiler is built from.
-fn compiler_version() -> Result<String, String> {
-    let lock = fs::read_to_string("Cargo.lock").map_err(|error| format!("Cargo.lock: {error}"))?;
-    let version = lock.split("name = \"shaderc\"\nversion = \"").nth(1).and_then(|rest| rest.split('"').next());
-    version.map(|version| format!("shaderc {version}")).ok_or_else(|| "Cargo.lock names no shaderc".to_owned())
 }

@@ -56,3 +56,10 @@ pub fn flattened_source(glsl: &Path, stage: &str) -> String {
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
+
+/// The shaderc crate of the lock file, whose sources the compiler is built from.
+pub fn compiler_version(lock: &Path) -> Result<String, String> {
+    let text = fs::read_to_string(lock).map_err(|error| format!("{}: {error}", lock.display()))?;
+    let version = text.split("name = \"shaderc\"\nversion = \"").nth(1).and_then(|rest| rest.split('"').next());
+    version.map(|version| format!("shaderc {version}")).ok_or_else(|| "Cargo.lock names no shaderc".to_owned())
+}

@@ -1,9 +1,14 @@
 //! The validation canary: runs a test on software Vulkan under the validation layer and fails it if the layer complains,
 //! be it about a missing barrier or about an object that outlives its device.
+//!
+//! With `SMALTI_TEST_STAGING=forced` in the environment every test goes through staging, as on a discrete GPU; software
+//! Vulkan would never take that path by itself.
 
 use std::sync::Arc;
 
-use smalti::vk::{Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, choose};
+use smalti::vk::{
+    Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Staging, Validation, choose,
+};
 
 /// Runs `test` on a fresh device, drops everything, and returns what the validation layer said.
 ///
@@ -20,7 +25,10 @@ pub fn watch<T>(options: &DeviceOptions, test: impl FnOnce(Arc<Device>) -> T) ->
     let choice = choose(&DeviceRequest::Name("llvmpipe".to_owned()), &devices)
         .unwrap_or_else(|error| panic!("tests run on software Vulkan; install mesa-vulkan-drivers: {error}"));
     let Choice::Vulkan(index) = choice else { panic!("a device asked for by name is a Vulkan device") };
-    let device = Device::create(&instance, &devices[index], options).expect("software Vulkan can be opened");
+    let staging = if is_staging_forced() { Staging::Forced } else { options.staging };
+    let options = DeviceOptions { staging, ..options.clone() };
+    let device = Device::create(&instance, &devices[index], &options).expect("software Vulkan can be opened");
+    assert_eq!(device.staging(), staging);
     let alive = Arc::downgrade(&device);
 
     let result = test(device);
@@ -34,4 +42,21 @@ pub fn with_device<T>(options: &DeviceOptions, test: impl FnOnce(Arc<Device>) ->
     let (result, messages) = watch(options, test);
     assert!(messages.is_empty(), "the validation layer complains:\n{}", messages.join("\n"));
     result
+}
+
+/// Whether the environment sends every test through staging.
+fn is_staging_forced() -> bool {
+    match std::env::var("SMALTI_TEST_STAGING").as_deref() {
+        Err(_) => false,
+        Ok("forced") => true,
+        Ok(other) => panic!("SMALTI_TEST_STAGING is {other}; it can only be `forced`"),
+    }
+}
+
+/// Without this a driver that ignores the variable would make the second run of the suite a mere repetition.
+#[test]
+fn the_subgroup_size_is_the_one_that_the_environment_asks_for() {
+    let Ok(vector_bits) = std::env::var("LP_NATIVE_VECTOR_WIDTH") else { return };
+    let lanes = vector_bits.parse::<u32>().expect("a vector width is a number of bits") / 32;
+    with_device(&DeviceOptions::default(), |device| assert_eq!(device.info().subgroup_size, lanes));
 }

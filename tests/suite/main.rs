@@ -8,7 +8,14 @@ mod cli;
 mod cli_interrupts;
 mod cli_refusals;
 mod exactness;
+mod layering;
+mod layout;
 mod reference;
 mod scenarios;
+#[path = "../../tools/shader_manifest.rs"]
+mod shader_manifest;
+mod shaders_fresh;
+mod spirv;
 mod vulkan;
 mod workshop;
+mod vulkan_failures;

@@ -1,0 +1,235 @@
+//! The layers of `src/`: who may import whom, and which modules may do what the others may not.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The modules of the crate, lowest level first. A module imports only modules of lower levels.
+const LEVELS: [&[&str]; 7] = [
+    &["error"],
+    &["photo", "output", "model"],
+    &["archive", "evolve", "cpu", "vk"],
+    &["gpu"],
+    &["engine"],
+    &["app"],
+    &["main"],
+];
+
+/// Imports of lower levels that are wrong all the same.
+const FORBIDDEN: [(&str, &[&str], &str); 1] =
+    [("engine", &["cpu", "gpu", "vk"], "the engine knows evaluators by their trait, so that it names no backend")];
+
+/// Words that only some modules may say.
+const RESERVED: [(&[&str], &[&str], &str); 4] = [
+    (&["unsafe"], &["vk"], "only `vk` is unsafe; give it a safe function"),
+    (
+        &["println!", "eprintln!", "print!", "eprint!", "stdout", "stderr"],
+        &["app", "main"],
+        "only `app` prints; return a value or an error",
+    ),
+    (&["std::env", "env::"], &["app", "main"], "only `app` reads the environment; take an option"),
+    (&["Instant", "SystemTime"], &["app", "main"], "only `app` reads the clock; take a duration or a stop reason"),
+];
+
+/// Longer than this and a file is two files.
+const LINES_MAX: usize = 450;
+
+struct Source {
+    /// Relative to the project, for messages.
+    path: PathBuf,
+    /// The module of the crate root that the file belongs to: `vk` for `src/vk/scope.rs`.
+    module: String,
+    /// How far the crate root is above the file's own module: 1 for `src/vk/mod.rs`, 2 for `src/vk/scope.rs`.
+    depth: usize,
+    text: String,
+}
+
+fn sources() -> Vec<Source> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut sources = Vec::new();
+    let mut folders = vec![root.join("src")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
+            let path = entry.expect("the folder can be read").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+                let path = path.strip_prefix(root).expect("sources lie in the project").to_owned();
+                sources.push(source(path, text));
+            }
+        }
+    }
+    sources.sort_by(|a, b| a.path.cmp(&b.path));
+    sources
+}
+
+fn source(path: PathBuf, text: String) -> Source {
+    let stems = path.iter().skip(1).map(|part| part.to_string_lossy().trim_end_matches(".rs").to_owned());
+    let modules: Vec<String> = stems.filter(|stem| stem != "mod").collect();
+    Source { module: modules[0].clone(), depth: modules.len(), path, text }
+}
+
+/// The code of a line, without its comment.
+fn code(line: &str) -> &str {
+    line.split("//").next().unwrap_or_default()
+}
+
+fn is_word_char(char: char) -> bool {
+    char.is_alphanumeric() || char == '_'
+}
+
+/// Byte positions after each `word` in `text`, where it is not a part of a longer word.
+fn ends_of<'a>(text: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
+    text.match_indices(word).filter_map(move |(start, _)| {
+        let end = start + word.len();
+        let is_start = !text[..start].ends_with(is_word_char);
+        let is_end = !word.ends_with(is_word_char) || !text[end..].starts_with(is_word_char);
+        (is_start && is_end).then_some(end)
+    })
+}
+
+/// The names at the start of `tree`, what follows `crate::`: one, or each of `{a, b::c, d::{e, f}}`.
+fn first_names(tree: &str) -> Vec<String> {
+    let name = |text: &str| text.trim_start().chars().take_while(|&char| is_word_char(char)).collect();
+    let Some(group) = tree.strip_prefix('{') else { return vec![name(tree)] };
+    let mut names = Vec::new();
+    let (mut depth, mut start) = (1, 0);
+    for (place, char) in group.char_indices() {
+        match char {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 || (depth == 1 && char == ',') {
+            names.push(name(&group[start..place]));
+            start = place + 1;
+        }
+        if depth == 0 {
+            break;
+        }
+    }
+    names.retain(|name: &String| !name.is_empty());
+    names
+}
+
+/// Modules of the crate root that a file names, each with its line. The binary names them through the library.
+fn imports(source: &Source) -> Vec<(usize, String)> {
+    let lines: Vec<&str> = source.text.lines().map(code).collect();
+    let text = lines.join("\n");
+    let mut imports = Vec::new();
+    for root in ["crate::", "smalti::"] {
+        for end in ends_of(&text, root) {
+            let line = 1 + text[..end].matches('\n').count();
+            imports.extend(first_names(&text[end..]).into_iter().map(|name| (line, name)));
+        }
+    }
+    imports
+}
+
+/// Lines that reach the crate root by `super::`, where [`imports`] would not see what they name.
+fn escapes(source: &Source) -> Vec<usize> {
+    let mut depth = source.depth;
+    let mut escapes = Vec::new();
+    for (line, text) in (1..).zip(source.text.lines().map(code)) {
+        // A module of tests inside the file; clippy lets nothing follow it.
+        depth += usize::from(text.trim_start().starts_with("mod ") && text.trim_end().ends_with('{'));
+        if text.contains(&"super::".repeat(depth)) {
+            escapes.push(line);
+        }
+    }
+    escapes
+}
+
+fn level(module: &str) -> Option<usize> {
+    LEVELS.iter().position(|modules| modules.contains(&module))
+}
+
+/// Why `from` must not import `to`, if so.
+fn objection(from: &str, to: &str) -> Option<String> {
+    if from == to {
+        return None;
+    }
+    let Some(to_level) = level(to) else {
+        return Some(format!("`{to}` is in no layer; name the module that defines it"));
+    };
+    let from_level = level(from)?;
+    if to_level >= from_level {
+        return Some(format!(
+            "`{from}` is on level {from_level} and `{to}` on level {to_level}; only lower levels may be"
+        ));
+    }
+    let (_, _, why) = FORBIDDEN.iter().find(|(module, others, _)| *module == from && others.contains(&to))?;
+    Some((*why).to_owned())
+}
+
+fn assert_none(complaints: &[String]) {
+    assert!(complaints.is_empty(), "\n{}\n", complaints.join("\n"));
+}
+
+#[test]
+fn every_module_imports_only_modules_of_lower_levels() {
+    let mut complaints = Vec::new();
+    // The crate root declares all modules and re-exports what it likes.
+    for source in sources().iter().filter(|source| source.module != "lib") {
+        let path = source.path.display();
+        if level(&source.module).is_none() {
+            complaints.push(format!("{path}: `{}` is in no layer of tests/suite/layering.rs", source.module));
+        }
+        for (line, name) in imports(source) {
+            let why = objection(&source.module, &name);
+            complaints.extend(why.map(|why| format!("{path}:{line} imports `{name}`: {why}")));
+        }
+        let escapes = escapes(source).into_iter();
+        complaints.extend(escapes.map(|line| format!("{path}:{line} leaves its module by `super`: say `crate::`")));
+    }
+    assert_none(&complaints);
+}
+
+#[test]
+fn only_vk_is_unsafe_and_only_the_app_prints_or_reads_the_clock_or_the_environment() {
+    let mut complaints = Vec::new();
+    for source in sources() {
+        for (words, modules, why) in RESERVED {
+            if modules.contains(&source.module.as_str()) {
+                continue;
+            }
+            for (line, text) in (1..).zip(source.text.lines().map(code)) {
+                let said = words.iter().find(|word| ends_of(text, word).next().is_some());
+                complaints.extend(said.map(|word| format!("{}:{line} says `{word}`: {why}", source.path.display())));
+            }
+        }
+    }
+    assert_none(&complaints);
+}
+
+#[test]
+fn no_source_file_is_too_long_to_read_at_once() {
+    let long = sources().into_iter().map(|source| (source.path, source.text.lines().count()));
+    let complaints: Vec<String> = long
+        .filter(|(_, lines)| *lines > LINES_MAX)
+        .map(|(path, lines)| format!("{} has {lines} lines, more than {LINES_MAX}; split it by topic", path.display()))
+        .collect();
+    assert_none(&complaints);
+}
+
+#[test]
+fn the_test_of_layers_sees_every_way_to_name_a_module() {
+    let file = |text: &str| source(PathBuf::from("src/vk/scope.rs"), text.to_owned());
+    let names = |text: &str| imports(&file(text)).into_iter().map(|(_, name)| name).collect::<Vec<_>>();
+    assert_eq!(names("use crate::model::{Fly, Tile};"), ["model"]);
+    assert_eq!(
+        names("pub(crate) use crate::{\n    error::{Error, Result}, // not gpu\n    model,\n};"),
+        ["error", "model"]
+    );
+    assert_eq!(names("let lane: smalti::cpu::Lane = crate::gpu::lane();"), ["gpu", "cpu"]);
+    assert_eq!(names("//! See [`crate::gpu`].\nuse other_crate::engine;"), [""; 0]);
+
+    assert_eq!(file("").module, "vk");
+    assert_eq!(escapes(&file("use super::image;\nuse super::super::model;")), [2]);
+    assert_eq!(escapes(&file("mod tests {\n    use super::super::image;\n    use super::super::super::model;")), [3]);
+
+    assert!(objection("vk", "error").is_none() && objection("vk", "vk").is_none() && objection("gpu", "vk").is_none());
+    for (from, to) in [("vk", "cpu"), ("model", "photo"), ("error", "model"), ("engine", "gpu"), ("engine", "app")] {
+        assert!(objection(from, to).is_some(), "{from} may import {to}");
+    }
+}
