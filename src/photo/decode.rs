@@ -50,8 +50,9 @@ pub struct Loaded {
 /// Reads the picture at `path`; its content, not its name, tells the format.
 ///
 /// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
-/// background, 8 bits, EXIF orientation, Lanczos3 to the size asked for. Decoded bytes are the same on every x86-64
-/// machine; on other processors an ICC profile may round a channel by one.
+/// background, 8 bits, EXIF orientation, Lanczos3 to the size asked for. The bytes are the same on every machine,
+/// but for an ICC profile that has tables and no matrix: there a processor's fused multiplications may round a channel
+/// by one.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, or exceeds

@@ -20,14 +20,19 @@ pub(super) fn fit(photo: &Photo, long_side_px: Option<u32>) -> Photo {
     if (width_px, height_px) == (photo.width_px, photo.height_px) {
         return photo.clone();
     }
+    // Columns first: both orders round and clip in between, so the order decides pixels, and it is Pillow's.
+    resized(&resized(photo, width_px, photo.height_px), width_px, height_px)
+}
+
+fn resized(photo: &Photo, width_px: u32, height_px: u32) -> Photo {
     let filter = Filter::new("Lanczos3", lanczos3, SUPPORT).expect("the support is positive");
     let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Custom(filter)));
     let bytes = bytemuck::cast_slice(&photo.pixels);
     let source = ImageRef::new(photo.width_px, photo.height_px, bytes, PixelType::U8x3)
         .expect("a photo has as many pixels as its size says");
-    let mut fitted = Image::new(width_px, height_px, PixelType::U8x3);
-    Resizer::new().resize(&source, &mut fitted, &options).expect("both images have pixels of one type");
-    let (pixels, _) = fitted.buffer().as_chunks::<3>();
+    let mut reduced = Image::new(width_px, height_px, PixelType::U8x3);
+    Resizer::new().resize(&source, &mut reduced, &options).expect("both images have pixels of one type");
+    let (pixels, _) = reduced.buffer().as_chunks::<3>();
     Photo { width_px, height_px, pixels: pixels.to_vec() }
 }
 
