@@ -6,7 +6,10 @@
 //! a positive value means that the fly helps.
 
 pub mod archive;
+pub mod cpu;
+pub mod engine;
 pub mod error;
+pub mod evolve;
 pub mod model;
 pub mod output;
 pub mod photo;

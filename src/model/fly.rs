@@ -110,18 +110,19 @@ impl Fly {
     /// Bounds that depend on the picture are not applied: see [`Fly::clamped`].
     #[must_use]
     pub fn from_genes(genes: &Genes, mask: u16) -> Self {
-        let px = UNITS_PER_PX as f32;
-        let channel = |value: f32| (value * 65535.0 + 0.5) as u16;
+        // In f64, since adding a half to a large f32 would round it away.
+        let rounded = |value: f32, scale: f64| libm::floor(f64::from(value) * scale + 0.5);
+        let px = f64::from(UNITS_PER_PX);
         Self {
-            x: libm::floorf(genes.x * px + 0.5) as i32,
-            y: libm::floorf(genes.y * px + 0.5) as i32,
-            z: (((genes.z + 1.0) * Z_ZERO + 0.5) as u32).min(Z_MAX),
-            r: channel(genes.r),
-            g: channel(genes.g),
-            b: channel(genes.b),
-            angle: (libm::floorf(genes.angle_deg * (65536.0 / 360.0) + 0.5) as i64 & 0xFFFF) as u16,
-            w: (genes.w * px + 0.5) as u32,
-            h: (genes.h * px + 0.5) as u32,
+            x: rounded(genes.x, px) as i32,
+            y: rounded(genes.y, px) as i32,
+            z: (rounded(genes.z + 1.0, f64::from(Z_ZERO)) as u32).min(Z_MAX),
+            r: rounded(genes.r, 65535.0) as u16,
+            g: rounded(genes.g, 65535.0) as u16,
+            b: rounded(genes.b, 65535.0) as u16,
+            angle: (rounded(genes.angle_deg, 65536.0 / 360.0) as i64 & 0xFFFF) as u16,
+            w: rounded(genes.w, px) as u32,
+            h: rounded(genes.h, px) as u32,
             mask,
             alive: true,
         }

@@ -3,12 +3,24 @@
 //! Everything here is integers, so that the CPU twin and every GPU decide the same. Nothing here knows a device, a file
 //! or a clock.
 
+pub mod blocks;
+pub mod evaluation;
 pub mod fly;
+pub mod lane;
 pub mod mask;
+pub mod mosaic;
+pub mod operators;
 pub mod population;
+pub mod rng;
+pub mod tables;
 pub mod target;
+pub mod tile;
 
+pub use evaluation::{Change, Evaluation, Evaluator, Layers, NO_FLY};
 pub use fly::Fly;
+pub use lane::{Lane, Scene};
 pub use mask::{Mask, MaskSet};
+pub use mosaic::{Mosaic, Patch};
 pub use population::Population;
 pub use target::{Rgb, Target};
+pub use tile::{Canvas, Tile};

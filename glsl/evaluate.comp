@@ -1,0 +1,197 @@
+// Per pixel the two nearest flies, per fly the marginal fitness, per lane the SAE: one workgroup is one block of
+// pixels, one invocation a column of PIXELS_PER_THREAD pixels in it. Twin: src/cpu/evaluate.rs.
+//
+// The tile list of a block comes nearest first, so the first tile that covers a pixel is its top and the second its
+// under. Sums are kept by taking off what the block added last time and adding what it adds now.
+#version 460
+#extension GL_EXT_samplerless_texture_functions : require
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+
+#include "shared/tile.glsl"
+#include "shared/error.glsl"
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const uint BLOCK_SIDE = 8u;
+layout(constant_id = 2) const uint PIXELS_PER_THREAD = 8u;
+// 1: only the SAE of the top layer, with one fly left out: a plain re-render, the baseline of the benches.
+layout(constant_id = 3) const uint RE_RENDER = 0u;
+
+struct Lane {
+    uint first_fly;
+    uint first_mask;
+    uint background;
+    uint sum;
+};
+
+struct WorkItem {
+    uint lane;
+    uint first_pixel;
+    int x;
+    int y;
+    uint first_entry;
+    uint entry_count;
+    uint flags;
+    uint padding;
+};
+
+// The block has no old sums to take off.
+const uint FLAG_FRESH = 1u;
+// The first tiles of the list were looked at by an earlier dispatch.
+const uint FLAG_CONTINUED = 2u;
+// A later dispatch looks at the rest of the list.
+const uint FLAG_UNFINISHED = 4u;
+// Highest byte of a target pixel inside the picture; 0 in the overhang of blocks at the edges.
+const uint INSIDE = 0xFF000000u;
+
+layout(std430, binding = 0) readonly buffer Lanes { Lane lanes[]; };
+layout(std430, binding = 1) readonly buffer Work { WorkItem items[]; };
+layout(std430, binding = 2) readonly buffer Entries { uint entries[]; };
+layout(std430, binding = 3) readonly buffer Tiles { Tile tiles[]; };
+layout(std430, binding = 4) readonly buffer Targets { uint targets[]; };
+layout(std430, binding = 5) buffer TopLayer { uint top_layer[]; };
+layout(std430, binding = 6) buffer UnderLayer { uint under_layer[]; };
+// Per pixel what it added to the sums: marginal fitness of its top fly << 10 | error.
+layout(std430, binding = 7) buffer Parts { int parts[]; };
+// 64-bit sums as pairs of words, low word first, since 64-bit atomics are not everywhere.
+layout(std430, binding = 8) buffer Marginal { uint marginal[]; };
+layout(std430, binding = 9) buffer Sums { uint sums[]; };
+layout(binding = 10) uniform utexture2DArray masks;
+
+layout(push_constant) uniform Push {
+    uint item_count;
+    // Only for RE_RENDER.
+    uint left_out_fly;
+    uint sum_offset;
+} push;
+
+void add_marginal(uint fly, int part) {
+    if (part == 0) {
+        return;
+    }
+    uint low = atomicAdd(marginal[2u * fly], uint(part));
+    int carry = (part >> 31) + (low + uint(part) < low ? 1 : 0);
+    if (carry != 0) {
+        atomicAdd(marginal[2u * fly + 1u], uint(carry));
+    }
+}
+
+void add_sum(uint sum, int part) {
+    if (part == 0) {
+        return;
+    }
+    uint low = atomicAdd(sums[2u * sum], uint(part));
+    int carry = (part >> 31) + (low + uint(part) < low ? 1 : 0);
+    if (carry != 0) {
+        atomicAdd(sums[2u * sum + 1u], uint(carry));
+    }
+}
+
+uvec2 mask_texel(Lane lane, Tile tile, uvec2 uv) {
+    return texelFetch(masks, ivec3(tile_texel(tile, uv), int(lane.first_mask + tile.mask)), 0).xy;
+}
+
+// The colour that `fly` shows at pixel (i, j), which it covers, or the background.
+uint shown_color(Lane lane, uint fly, int i, int j) {
+    if (fly == NO_FLY) {
+        return lane.background;
+    }
+    Tile tile = tiles[lane.first_fly + fly];
+    if (tile.mask == 0u) {
+        return tile.color;
+    }
+    return shaded(tile.color, mask_texel(lane, tile, tile_coordinates(tile, i, j)).y);
+}
+
+void main() {
+    uint number = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    if (number >= push.item_count) {
+        return;
+    }
+    WorkItem item = items[number];
+    Lane lane = lanes[item.lane];
+    uint column = gl_LocalInvocationID.x % BLOCK_SIDE;
+    uint row = gl_LocalInvocationID.x / BLOCK_SIDE * PIXELS_PER_THREAD;
+    uint first_pixel = item.first_pixel + row * BLOCK_SIDE + column;
+    int i = item.x + int(column);
+    int j = item.y + int(row);
+
+    uint top[PIXELS_PER_THREAD];
+    uint under[PIXELS_PER_THREAD];
+    bool continued = (item.flags & FLAG_CONTINUED) != 0u;
+    for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
+        top[p] = continued ? top_layer[first_pixel + p * BLOCK_SIDE] : NO_FLY;
+        under[p] = continued ? under_layer[first_pixel + p * BLOCK_SIDE] : NO_FLY;
+    }
+
+    for (uint entry = item.first_entry; entry < item.first_entry + item.entry_count; ++entry) {
+        uint fly = entries[entry];
+        if (RE_RENDER == 1u && fly == push.left_out_fly) {
+            continue;
+        }
+        Tile tile = tiles[lane.first_fly + fly];
+        uvec2 end = uvec2(tile.w << 12, tile.h << 12);
+        uvec2 uv = tile_coordinates(tile, i, j);
+        bool open = false;
+        for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
+            bool covered = uv.x < end.x && uv.y < end.y;
+            if (tile.mask != 0u) {
+                if (covered) {
+                    covered = mask_texel(lane, tile, uv).x >= COVERAGE_THRESHOLD;
+                }
+            }
+            uint candidate = covered ? fly : NO_FLY;
+            if (RE_RENDER == 0u) {
+                under[p] = top[p] != NO_FLY && under[p] == NO_FLY ? candidate : under[p];
+                open = open || under[p] == NO_FLY;
+            }
+            top[p] = top[p] == NO_FLY ? candidate : top[p];
+            if (RE_RENDER == 1u) {
+                open = open || top[p] == NO_FLY;
+            }
+            uv += uvec2(uint(tile.sin_step), uint(tile.cos_step));
+        }
+        if (!open) {
+            break;
+        }
+    }
+
+    bool fresh = (item.flags & FLAG_FRESH) != 0u;
+    bool unfinished = (item.flags & FLAG_UNFINISHED) != 0u;
+    int error_change = 0;
+    for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
+        uint pixel = first_pixel + p * BLOCK_SIDE;
+        uint target = targets[pixel];
+        bool inside = (target & INSIDE) != 0u;
+        if (RE_RENDER == 1u) {
+            int shown_error = color_error(target, shown_color(lane, top[p], i, j + int(p)));
+            error_change += inside ? shown_error : 0;
+            continue;
+        }
+        if (!continued && !fresh) {
+            int old = parts[pixel];
+            if (top_layer[pixel] != NO_FLY) {
+                add_marginal(lane.first_fly + top_layer[pixel], -(old >> 10));
+            }
+            error_change -= old & 1023;
+        }
+        top_layer[pixel] = top[p];
+        under_layer[pixel] = under[p];
+        if (!unfinished) {
+            int top_error = color_error(target, shown_color(lane, top[p], i, j + int(p)));
+            int under_error = color_error(target, shown_color(lane, under[p], i, j + int(p)));
+            int part = inside ? under_error - top_error : 0;
+            top_error = inside ? top_error : 0;
+            if (top[p] != NO_FLY) {
+                add_marginal(lane.first_fly + top[p], part);
+            }
+            error_change += top_error;
+            parts[pixel] = part << 10 | top_error;
+        }
+    }
+    int subgroup_change = subgroupAdd(error_change);
+    if (subgroupElect()) {
+        add_sum(lane.sum + push.sum_offset, subgroup_change);
+    }
+}

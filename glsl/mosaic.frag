@@ -1,0 +1,41 @@
+// Colour and fly of a pixel, if the tile covers it by the integer rule. Twin: src/cpu/mosaic.rs.
+#version 460
+#extension GL_EXT_samplerless_texture_functions : require
+#extension GL_GOOGLE_include_directive : require
+
+#include "shared/tile.glsl"
+
+layout(std430, binding = 0) readonly buffer Tiles { Tile tiles[]; };
+layout(binding = 2) uniform utexture2DArray masks;
+
+layout(push_constant) uniform Push {
+    ivec2 origin;
+    vec2 pixel_size;
+    uint first_mask;
+} push;
+
+layout(location = 0) flat in uint fly;
+layout(location = 1) flat in uint rank;
+layout(location = 0) out vec4 color;
+layout(location = 1) out uint shown_fly;
+
+void main() {
+    Tile tile = tiles[fly];
+    ivec2 pixel = ivec2(gl_FragCoord.xy) + push.origin;
+    uvec2 uv = tile_coordinates(tile, pixel.x, pixel.y);
+    if (!is_inside(tile, uv)) {
+        discard;
+    }
+    uint shown = tile.color;
+    if (tile.mask != 0u) {
+        uvec2 texel = texelFetch(masks, ivec3(tile_texel(tile, uv), int(push.first_mask + tile.mask)), 0).xy;
+        if (texel.x < COVERAGE_THRESHOLD) {
+            discard;
+        }
+        shown = shaded(shown, texel.y);
+    }
+    color = vec4(uvec3(shown, shown >> 8, shown >> 16) & 255u, 255.0) / 255.0;
+    shown_fly = fly;
+    // Ranks are below 2^24, so each is a different float.
+    gl_FragDepth = float(rank) / 16777216.0;
+}

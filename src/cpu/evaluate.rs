@@ -1,0 +1,299 @@
+//! Twin of `glsl/evaluate.comp`: the two nearest flies of every pixel, the marginal fitness of every fly, and the SAE.
+//!
+//! Exact by construction: `F(i) = sum over pixels whose top is i of (|t - c2| - |t - c1|)` with the colours c1 of the
+//! top and c2 of the under fly (paper Eq. 3, for all flies at once).
+
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+use crate::model::blocks::index_of;
+use crate::model::mask::{COVERAGE_THRESHOLD, MaskSet, shaded};
+use crate::model::tile::{Tile, pack, unpack};
+use crate::model::{Evaluation, Fly, Lane, Layers, NO_FLY, Scene, Target};
+
+/// Pixels along each side of a block: one vector of 8 columns a row (`cargo bench --bench full_evaluation`).
+const SIDE: usize = 8;
+const PIXELS: usize = SIDE * SIDE;
+/// From this many stale blocks on, sharing them among threads pays for itself.
+const PARALLEL_FROM: usize = 128;
+/// Highest byte of a target pixel inside the picture; 0 marks the overhang of blocks at the edges.
+const INSIDE: u32 = 0xFF00_0000;
+
+/// Target pixels of one block, packed, with [`INSIDE`].
+type TargetBlock = [u32; PIXELS];
+
+/// What the pixels of one block add up to.
+#[derive(Clone, Debug)]
+struct Block {
+    top: [u32; PIXELS],
+    under: [u32; PIXELS],
+    /// What the block adds to the marginal fitness of each fly that shows in it.
+    parts: Vec<(u32, i32)>,
+    /// What the block adds to the SAE.
+    error: u32,
+}
+
+impl Default for Block {
+    fn default() -> Self {
+        Self { top: [NO_FLY; PIXELS], under: [NO_FLY; PIXELS], parts: Vec::new(), error: 0 }
+    }
+}
+
+/// The running evaluation of one lane.
+#[derive(Debug)]
+pub(super) struct LaneEvaluation {
+    lane: Lane,
+    target: Vec<TargetBlock>,
+    blocks: Vec<Block>,
+    marginal: Vec<i64>,
+    sae: u64,
+}
+
+impl LaneEvaluation {
+    pub(super) fn new(scene: Scene) -> Self {
+        let fly_count = scene.fly_count;
+        let lane = Lane::new(scene, SIDE as u32);
+        let target = target_blocks(&lane);
+        let blocks = vec![Block::default(); lane.lists().block_count()];
+        Self { lane, target, blocks, marginal: vec![0; fly_count], sae: 0 }
+    }
+
+    pub(super) fn scene(&self) -> &Scene {
+        self.lane.scene()
+    }
+
+    /// Evaluates a whole population afresh.
+    pub(super) fn load(&mut self, flies: &[Fly]) {
+        self.lane.load(flies);
+        let (lane, target) = (&self.lane, &self.target);
+        self.blocks.par_iter_mut().enumerate().with_min_len(PARALLEL_FROM / 2).for_each_init(
+            Palette::default,
+            |palette, (number, block)| {
+                refresh(lane, number, &target[number], block, palette);
+            },
+        );
+        self.marginal.fill(0);
+        self.sae = 0;
+        for block in &self.blocks {
+            add_parts(block, &mut self.marginal, &mut self.sae);
+        }
+    }
+
+    /// Replaces a fly; the evaluation is stale until [`LaneEvaluation::refresh_touched`].
+    pub(super) fn replace(&mut self, index: u32, fly: &Fly) {
+        self.lane.replace(index, fly);
+    }
+
+    /// Refreshes the stale blocks: takes their old parts off the sums and adds the new ones.
+    pub(super) fn refresh_touched(&mut self) {
+        let (lane, target) = (&self.lane, &self.target);
+        let touched = lane.touched();
+        if touched.len() < PARALLEL_FROM {
+            let mut palette = Palette::default();
+            for &number in touched {
+                let block = &mut self.blocks[number as usize];
+                subtract_parts(block, &mut self.marginal, &mut self.sae);
+                refresh(lane, number as usize, &target[number as usize], block, &mut palette);
+                add_parts(block, &mut self.marginal, &mut self.sae);
+            }
+        } else {
+            let refreshed: Vec<Block> = touched
+                .par_iter()
+                .with_min_len(PARALLEL_FROM / 2)
+                .map_init(Palette::default, |palette, &number| {
+                    let mut block = Block::default();
+                    refresh(lane, number as usize, &target[number as usize], &mut block, palette);
+                    block
+                })
+                .collect();
+            for (&number, new) in touched.iter().zip(refreshed) {
+                let block = &mut self.blocks[number as usize];
+                subtract_parts(block, &mut self.marginal, &mut self.sae);
+                *block = new;
+                add_parts(block, &mut self.marginal, &mut self.sae);
+            }
+        }
+        self.lane.clear_touched();
+    }
+
+    pub(super) fn evaluation(&self) -> Evaluation<'_> {
+        Evaluation { sae: self.sae, marginal: &self.marginal }
+    }
+
+    pub(super) fn layers(&self) -> Layers {
+        let target = &self.lane.scene().target;
+        let (width, height) = (target.width_px() as usize, target.height_px() as usize);
+        let columns = self.lane.lists().columns() as usize;
+        let row_by_row = |layer: fn(&Block) -> &[u32; PIXELS]| {
+            let pixel =
+                |(i, j): (usize, usize)| layer(&self.blocks[j / SIDE * columns + i / SIDE])[j % SIDE * SIDE + i % SIDE];
+            (0..height).flat_map(|j| (0..width).map(move |i| (i, j))).map(pixel).collect()
+        };
+        Layers { top: row_by_row(|block| &block.top), under: row_by_row(|block| &block.under) }
+    }
+}
+
+fn add_parts(block: &Block, marginal: &mut [i64], sae: &mut u64) {
+    *sae += u64::from(block.error);
+    for &(fly, part) in &block.parts {
+        marginal[fly as usize] += i64::from(part);
+    }
+}
+
+fn subtract_parts(block: &Block, marginal: &mut [i64], sae: &mut u64) {
+    *sae -= u64::from(block.error);
+    for &(fly, part) in &block.parts {
+        marginal[fly as usize] -= i64::from(part);
+    }
+}
+
+/// The target cut into blocks; pixels beyond the picture's edge are 0.
+fn target_blocks(lane: &Lane) -> Vec<TargetBlock> {
+    let target: &Target = &lane.scene().target;
+    let (width, height) = (target.width_px() as usize, target.height_px() as usize);
+    let mut blocks = vec![[0; PIXELS]; lane.lists().block_count()];
+    for (number, block) in blocks.iter_mut().enumerate() {
+        let (x, y) = lane.lists().origin(number);
+        let (x, y) = (x as usize, y as usize);
+        for row in 0..SIDE.min(height - y) {
+            let pixels = &target.pixels()[(y + row) * width + x..][..SIDE.min(width - x)];
+            for (place, &color) in block[row * SIDE..].iter_mut().zip(pixels) {
+                *place = pack(color) | INSIDE;
+            }
+        }
+    }
+    blocks
+}
+
+/// Buffers that a thread uses again for each block: per list slot the colour, and the part of marginal fitness. The
+/// slot after the last tile is the background.
+#[derive(Default)]
+struct Palette {
+    colors: Vec<u32>,
+    parts: Vec<i32>,
+}
+
+/// Recomputes one block from its list.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
+fn refresh(lane: &Lane, number: usize, target: &TargetBlock, block: &mut Block, palette: &mut Palette) {
+    let list = lane.lists().list(number);
+    let (x, y) = lane.lists().origin(number);
+    let background = list.len() as u32;
+    let mut top = [background; PIXELS];
+    let mut under = [background; PIXELS];
+    let mut any_mask = false;
+    palette.colors.clear();
+    for (slot, &key) in (0..).zip(list) {
+        let tile = &lane.tiles()[index_of(key) as usize];
+        palette.colors.push(tile.color);
+        if tile.mask == 0 {
+            scan_square(tile, slot, background, (x as i32, y as i32), &mut top, &mut under);
+        } else {
+            any_mask = true;
+            scan_masked(tile, &lane.scene().masks, slot, background, (x as i32, y as i32), &mut top, &mut under);
+        }
+    }
+    palette.colors.push(pack(lane.scene().background));
+    palette.parts.clear();
+    palette.parts.resize(palette.colors.len(), 0);
+
+    block.error = 0;
+    for pixel in 0..PIXELS {
+        let inside = target[pixel] & INSIDE != 0;
+        let (slot, next) = (top[pixel], under[pixel]);
+        let (mut c1, mut c2) = (palette.colors[slot as usize], palette.colors[next as usize]);
+        if any_mask {
+            let at = (x as i32 + (pixel % SIDE) as i32, y as i32 + (pixel / SIDE) as i32);
+            c1 = shaded_color(lane, list, slot, at, c1);
+            c2 = shaded_color(lane, list, next, at, c2);
+        }
+        let (e1, e2) = (error(target[pixel], c1), error(target[pixel], c2));
+        block.error += if inside { e1 as u32 } else { 0 };
+        palette.parts[slot as usize] += if inside { e2 - e1 } else { 0 };
+    }
+    block.parts.clear();
+    for (&key, &part) in list.iter().zip(&palette.parts) {
+        if part != 0 {
+            block.parts.push((index_of(key), part));
+        }
+    }
+    let fly = |slot: u32| list.get(slot as usize).map_or(NO_FLY, |&key| index_of(key));
+    block.top = top.map(fly);
+    block.under = under.map(fly);
+}
+
+/// Puts a tile without holes into the two layers. Slots rise with depth, so the smallest two slots that cover a pixel
+/// are its top and under; without branches, a row of 8 pixels is one vector.
+#[inline(always)]
+fn scan_square(
+    tile: &Tile,
+    slot: u32,
+    none: u32,
+    (x, y): (i32, i32),
+    top: &mut [u32; PIXELS],
+    under: &mut [u32; PIXELS],
+) {
+    let (first, last) = ((tile.y0 - y).max(0), (tile.y1 - y).min(SIDE as i32 - 1));
+    let (u_end, v_end) = (tile.u_end(), tile.v_end());
+    let (mut u, mut v) = tile.coordinates(x, y + first);
+    let u_steps: [u32; SIDE] = std::array::from_fn(|i| tile.cos.wrapping_mul(i as i32) as u32);
+    let v_steps: [u32; SIDE] = std::array::from_fn(|i| tile.sin.wrapping_mul(i as i32) as u32);
+    for row in first..=last {
+        let start = row as usize * SIDE;
+        let (top, under) = (&mut top[start..start + SIDE], &mut under[start..start + SIDE]);
+        for i in 0..SIDE {
+            let covered = (u.wrapping_add(u_steps[i]) < u_end) & (v.wrapping_sub(v_steps[i]) < v_end);
+            let candidate = if covered { slot } else { none };
+            under[i] = under[i].min(top[i].max(candidate));
+            top[i] = top[i].min(candidate);
+        }
+        u = u.wrapping_add(tile.sin as u32);
+        v = v.wrapping_add(tile.cos as u32);
+    }
+}
+
+/// Puts a tile with a mask into the two layers, pixel by pixel.
+#[inline(always)]
+fn scan_masked(
+    tile: &Tile,
+    masks: &MaskSet,
+    slot: u32,
+    none: u32,
+    (x, y): (i32, i32),
+    top: &mut [u32; PIXELS],
+    under: &mut [u32; PIXELS],
+) {
+    let mask = &masks.layers()[tile.mask as usize];
+    for pixel in 0..PIXELS {
+        let (u, v) = tile.coordinates(x + (pixel % SIDE) as i32, y + (pixel / SIDE) as i32);
+        if u < tile.u_end() && v < tile.v_end() {
+            let (column, row) = tile.texel(u, v);
+            let candidate = if mask.texel(column, row).coverage >= COVERAGE_THRESHOLD { slot } else { none };
+            under[pixel] = under[pixel].min(top[pixel].max(candidate));
+            top[pixel] = top[pixel].min(candidate);
+        }
+    }
+}
+
+/// The colour that the tile in `slot` shows at pixel `(i, j)`: `plain`, or `plain` under its mask's shade.
+fn shaded_color(lane: &Lane, list: &[u64], slot: u32, (i, j): (i32, i32), plain: u32) -> u32 {
+    let Some(&key) = list.get(slot as usize) else { return plain };
+    tile_color(&lane.tiles()[index_of(key) as usize], &lane.scene().masks, i, j, plain)
+}
+
+/// The colour of a tile at pixel `(i, j)`, which it covers.
+pub(super) fn tile_color(tile: &Tile, masks: &MaskSet, i: i32, j: i32, plain: u32) -> u32 {
+    if tile.mask == 0 {
+        return plain;
+    }
+    let (u, v) = tile.coordinates(i, j);
+    let (column, row) = tile.texel(u, v);
+    pack(shaded(unpack(plain), masks.layers()[tile.mask as usize].texel(column, row).shade))
+}
+
+/// Sum of absolute differences of the three channels.
+#[inline(always)]
+fn error(a: u32, b: u32) -> i32 {
+    let channel = |shift: u32| ((a >> shift & 255) as i32 - (b >> shift & 255) as i32).abs();
+    channel(0) + channel(8) + channel(16)
+}

@@ -1,0 +1,236 @@
+//! One evolution: the current population of a lane, its best, and what to do next.
+//!
+//! It alternates with an evaluator: [`Evolution::breed`] says what to change, the evaluator evaluates, and
+//! [`Evolution::absorb`] takes the new fitness in.
+
+use super::restart::BestPopulation;
+use super::scheme::{OnDry, PaperScheme};
+use super::selection::{Selection, Victim, choose_parent};
+use crate::model::operators::{Amplitudes, mutated, random_fly, tile_side};
+use crate::model::rng::{Purpose, Stream};
+use crate::model::{Change, Evaluation, Fly};
+
+/// Why an evolution ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopReason {
+    /// All births of all runs were made.
+    Births,
+    /// The last run saw no better population for as many births as its patience.
+    Patience,
+    /// No fly with marginal fitness <= 0 was left.
+    Dry,
+    /// The global fitness reached the target.
+    TargetSae,
+    /// Ended from outside: the time was up.
+    Time,
+    /// Ended from outside: interrupted.
+    Interrupted,
+}
+
+impl StopReason {
+    /// The word for results and metadata.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Births => "births",
+            Self::Patience => "patience",
+            Self::Dry => "dry",
+            Self::TargetSae => "target-sae",
+            Self::Time => "time",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// What an evolution wants next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Replace the flies that were added to the changes.
+    Replace,
+    /// Load [`Evolution::flies`] afresh: a restart.
+    Restart,
+    /// Nothing: the evolution has ended.
+    Stop(StopReason),
+}
+
+/// What an evolution counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// Births of all runs.
+    pub births: u64,
+    /// Births whose victim was chosen by the fallback.
+    pub fallback_kills: u64,
+    /// Restarts made.
+    pub restarts: u32,
+}
+
+/// The steady-state loop of one lane.
+#[derive(Clone, Debug)]
+pub struct Evolution {
+    scheme: PaperScheme,
+    lane: usize,
+    width_px: u32,
+    height_px: u32,
+    flies: Vec<Fly>,
+    best: Option<BestPopulation>,
+    amplitudes: Amplitudes,
+    selection: Selection,
+    outcome: Outcome,
+    births_in_run: u64,
+    births_at_best: u64,
+    stop: Option<StopReason>,
+}
+
+/// The first population of the paper's scheme: uniform random flies with sides by Eq. 1.
+#[must_use]
+pub fn random_population(width_px: u32, height_px: u32, fly_count: usize, seed: u64) -> Vec<Fly> {
+    let side = tile_side(width_px, height_px, fly_count);
+    let fly = |slot| random_fly(width_px, height_px, side, &mut Stream::new(seed, Purpose::FirstPopulation, 0, slot));
+    (0..fly_count as u64).map(fly).collect()
+}
+
+impl Evolution {
+    /// An evolution of `lane`, a picture of `width_px` x `height_px`, that begins from `flies`.
+    #[must_use]
+    pub fn new(scheme: PaperScheme, lane: usize, width_px: u32, height_px: u32, flies: Vec<Fly>) -> Self {
+        Self {
+            amplitudes: Amplitudes::paper(width_px, height_px, flies.len()),
+            selection: Selection::new(flies.len()),
+            scheme,
+            lane,
+            width_px,
+            height_px,
+            flies,
+            best: None,
+            outcome: Outcome::default(),
+            births_in_run: 0,
+            births_at_best: 0,
+            stop: None,
+        }
+    }
+
+    /// The lane that this evolution drives.
+    #[must_use]
+    pub fn lane(&self) -> usize {
+        self.lane
+    }
+
+    /// The current population.
+    #[must_use]
+    pub fn flies(&self) -> &[Fly] {
+        &self.flies
+    }
+
+    /// The best population; the current one before the first evaluation.
+    #[must_use]
+    pub fn best_flies(&self) -> &[Fly] {
+        self.best.as_ref().map_or(&self.flies, BestPopulation::flies)
+    }
+
+    /// Global fitness of the best population, once there is one.
+    #[must_use]
+    pub fn best_sae(&self) -> Option<u64> {
+        self.best.as_ref().map(BestPopulation::sae)
+    }
+
+    /// What was counted so far.
+    #[must_use]
+    pub fn outcome(&self) -> Outcome {
+        self.outcome
+    }
+
+    /// Births that all runs make if nothing stops them.
+    #[must_use]
+    pub fn births_planned(&self) -> u64 {
+        self.scheme.births.saturating_mul(u64::from(self.scheme.restarts) + 1)
+    }
+
+    /// Why the evolution ended, if it has.
+    #[must_use]
+    pub fn stop_reason(&self) -> Option<StopReason> {
+        self.stop
+    }
+
+    /// Ends the evolution from outside.
+    pub fn stop(&mut self, reason: StopReason) {
+        self.stop.get_or_insert(reason);
+    }
+
+    /// Decides the next step against the fitness of the current population, and adds its changes to `changes`.
+    pub fn breed(&mut self, evaluation: &Evaluation<'_>, changes: &mut Vec<Change>) -> Step {
+        if let Some(reason) = self.stop {
+            return Step::Stop(reason);
+        }
+        let left = self.scheme.births - self.births_in_run;
+        if left == 0 {
+            return self.end_run(StopReason::Births);
+        }
+        if self.scheme.patience.is_some_and(|patience| self.births_in_run - self.births_at_best >= patience) {
+            return self.end_run(StopReason::Patience);
+        }
+        self.selection.begin_generation();
+        let births = left.min(u64::from(self.scheme.batch_births));
+        for birth in 0..births {
+            if !self.give_birth(evaluation.marginal, changes) {
+                if birth == 0 {
+                    return self.end_run(StopReason::Dry);
+                }
+                break;
+            }
+        }
+        Step::Replace
+    }
+
+    /// One death and one birth; false if no fly may die.
+    fn give_birth(&mut self, marginal: &[i64], changes: &mut Vec<Change>) -> bool {
+        let run = self.outcome.restarts;
+        let mut stream = Stream::new(self.scheme.seed, Purpose::Birth, run, self.births_in_run);
+        let fallback = self.scheme.on_dry == OnDry::Fallback;
+        let index = match self.selection.choose_victim(marginal, fallback, &mut stream) {
+            Victim::Bad(fly) => fly,
+            Victim::Fallback(fly) => {
+                self.outcome.fallback_kills += 1;
+                fly
+            }
+            Victim::Dry => return false,
+        };
+        let parent = self.flies[choose_parent(marginal, &mut stream) as usize];
+        let fly = mutated(&parent, &self.amplitudes, self.width_px, self.height_px, &mut stream);
+        changes.push(Change { lane: self.lane, index, fly });
+        self.births_in_run += 1;
+        self.outcome.births += 1;
+        true
+    }
+
+    /// Ends a run: the next one begins from the best population with cooler amplitudes, if any is left.
+    fn end_run(&mut self, reason: StopReason) -> Step {
+        let dry_stop = reason == StopReason::Dry && self.scheme.on_dry == OnDry::Stop;
+        if dry_stop || self.outcome.restarts == self.scheme.restarts {
+            self.stop = Some(reason);
+            return Step::Stop(reason);
+        }
+        self.outcome.restarts += 1;
+        self.births_in_run = 0;
+        self.births_at_best = 0;
+        self.amplitudes = self.amplitudes.scaled(self.scheme.cool_q16);
+        if let Some(best) = &mut self.best {
+            best.restore(&mut self.flies);
+        }
+        Step::Restart
+    }
+
+    /// Takes in the changes that were made since the last call, and the global fitness that they led to.
+    pub fn absorb(&mut self, changes: &[Change], sae: u64) {
+        let best = self.best.get_or_insert_with(|| BestPopulation::new(&self.flies, sae));
+        for change in changes {
+            self.flies[change.index as usize] = change.fly;
+            best.note_change(change.index);
+        }
+        if best.offer(&self.flies, sae) {
+            self.births_at_best = self.births_in_run;
+        }
+        if self.scheme.target_sae.is_some_and(|target| best.sae() <= target) {
+            self.stop(StopReason::TargetSae);
+        }
+    }
+}

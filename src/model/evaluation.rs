@@ -1,0 +1,81 @@
+//! What an evaluator answers: global and marginal fitness, layers, and the drawn mosaic.
+
+use super::fly::Fly;
+use super::lane::Scene;
+use super::mosaic::Mosaic;
+use super::population::Population;
+use super::tile::Canvas;
+use crate::error::Result;
+
+/// No fly: the background shows.
+pub const NO_FLY: u32 = u32::MAX;
+
+/// One fly of one lane is replaced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Change {
+    /// Lane, in the order of the scenes.
+    pub lane: usize,
+    /// Index of the fly that is replaced.
+    pub index: u32,
+    /// What takes its place.
+    pub fly: Fly,
+}
+
+/// The fitness of a lane's population.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Evaluation<'a> {
+    /// Global fitness: the sum of absolute errors over all pixels and channels; lower is better.
+    pub sae: u64,
+    /// Marginal fitness of each fly (paper Eq. 3): the SAE without it minus the SAE with it; positive means it helps.
+    pub marginal: &'a [i64],
+}
+
+/// Per pixel, row by row, the two nearest flies that cover it, or [`NO_FLY`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layers {
+    /// The fly that shows.
+    pub top: Vec<u32>,
+    /// The fly that would show without the top one.
+    pub under: Vec<u32>,
+}
+
+/// Evaluates the populations of several pictures (lanes) at once, exactly, and draws them.
+///
+/// Every implementation gives the same numbers and the same pixels.
+pub trait Evaluator: Send {
+    /// What evaluates, for people: a device's name, or the CPU.
+    fn label(&self) -> String;
+
+    /// The scenes of all lanes, in order.
+    fn scene(&self, lane: usize) -> &Scene;
+
+    /// Number of lanes.
+    fn lane_count(&self) -> usize;
+
+    /// Loads whole populations into lanes and evaluates these lanes afresh, in one dispatch.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn load(&mut self, populations: &[(usize, &[Fly])]) -> Result<()>;
+
+    /// Replaces flies and refreshes only the blocks that the changes touch, in one dispatch for all lanes.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn replace(&mut self, changes: &[Change]) -> Result<()>;
+
+    /// Fitness of `lane` after the last [`Evaluator::load`] or [`Evaluator::replace`].
+    fn evaluation(&self, lane: usize) -> Evaluation<'_>;
+
+    /// The two nearest flies of every pixel of `lane`.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn read_back_layers(&mut self, lane: usize) -> Result<Layers>;
+
+    /// Draws a population on `canvas` with `supersampling`² samples per pixel.
+    ///
+    /// # Errors
+    /// If the device fails, or has no memory for the population.
+    fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic>;
+}

@@ -1,0 +1,116 @@
+//! A lane: one picture among those evolved together, with its population baked and sorted into blocks.
+//!
+//! This is the part of an evaluation that the CPU keeps for every evaluator: which tiles there are, which blocks they
+//! touch, and which blocks the last replacements made stale.
+
+use std::sync::Arc;
+
+use super::blocks::BlockLists;
+use super::fly::Fly;
+use super::mask::MaskSet;
+use super::target::{Rgb, Target};
+use super::tile::{Canvas, Tile};
+
+/// What stays the same while a lane evolves.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The picture to match.
+    pub target: Arc<Target>,
+    /// Tile shapes that the flies may wear.
+    pub masks: Arc<MaskSet>,
+    /// Colour behind all tiles.
+    pub background: Rgb,
+    /// Number of flies, absent ones included.
+    pub fly_count: usize,
+}
+
+/// The population of one scene, ready to be evaluated block by block.
+#[derive(Clone, Debug)]
+pub struct Lane {
+    scene: Scene,
+    canvas: Canvas,
+    flies: Vec<Fly>,
+    tiles: Vec<Tile>,
+    lists: BlockLists,
+    touched: Vec<u32>,
+    is_touched: Vec<bool>,
+}
+
+impl Lane {
+    /// A lane of absent flies, with blocks of `block_side_px`.
+    #[must_use]
+    pub fn new(scene: Scene, block_side_px: u32) -> Self {
+        let canvas = Canvas::evaluation(scene.target.width_px(), scene.target.height_px());
+        let lists = BlockLists::new(&canvas, block_side_px);
+        Self {
+            flies: vec![Fly::ABSENT; scene.fly_count],
+            tiles: vec![Tile::EMPTY; scene.fly_count],
+            touched: Vec::new(),
+            is_touched: vec![false; lists.block_count()],
+            scene,
+            canvas,
+            lists,
+        }
+    }
+
+    /// What stays the same while the lane evolves.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The baked flies, by index.
+    #[must_use]
+    pub fn tiles(&self) -> &[Tile] {
+        &self.tiles
+    }
+
+    /// The tile lists of the blocks.
+    #[must_use]
+    pub fn lists(&self) -> &BlockLists {
+        &self.lists
+    }
+
+    /// Blocks that changed since [`Lane::clear_touched`], each once, in the order in which they were touched.
+    #[must_use]
+    pub fn touched(&self) -> &[u32] {
+        &self.touched
+    }
+
+    /// Forgets which blocks changed: they have been refreshed.
+    pub fn clear_touched(&mut self) {
+        for block in self.touched.drain(..) {
+            self.is_touched[block as usize] = false;
+        }
+    }
+
+    /// Replaces the whole population and marks nothing as touched: all blocks are stale.
+    ///
+    /// # Panics
+    /// If `flies` is not as long as the scene's `fly_count`.
+    pub fn load(&mut self, flies: &[Fly]) {
+        assert_eq!(flies.len(), self.scene.fly_count, "a lane keeps its number of flies");
+        self.flies.copy_from_slice(flies);
+        for (tile, fly) in self.tiles.iter_mut().zip(flies) {
+            *tile = Tile::bake(fly, &self.canvas);
+        }
+        self.lists.fill(&self.flies, &self.tiles);
+        self.clear_touched();
+    }
+
+    /// Replaces fly `index` by `fly`, and marks the blocks of both boxes as touched.
+    pub fn replace(&mut self, index: u32, fly: &Fly) {
+        let place = index as usize;
+        let tile = Tile::bake(fly, &self.canvas);
+        let (touched, is_touched) = (&mut self.touched, &mut self.is_touched);
+        let mut touch = |block: usize| {
+            if !std::mem::replace(&mut is_touched[block], true) {
+                touched.push(block as u32);
+            }
+        };
+        self.lists.remove(self.flies[place].depth_key(index), &self.tiles[place], &mut touch);
+        self.lists.insert(fly.depth_key(index), &tile, &mut touch);
+        self.flies[place] = *fly;
+        self.tiles[place] = tile;
+    }
+}

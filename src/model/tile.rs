@@ -1,0 +1,216 @@
+//! A tile: the fly baked for pixels. It is all that a pixel decision ever reads, on the CPU and on every device.
+//!
+//! Twin: `glsl/shared/tile.glsl`. Coverage is integer, so both give the same bits.
+
+use super::fly::{Fly, SIDE_MAX, UNITS_PER_PX};
+use super::mask::MASK_SIDE;
+use super::tables::{TRIG_ONE, cos_sin};
+use super::target::Rgb;
+
+/// A fly baked to integers for one canvas. A pixel `(i, j)` inside the box has tile coordinates
+/// `u = u0 + (i - x0) * cos + (j - y0) * sin` and `v = v0 - (i - x0) * sin + (j - y0) * cos`, both counted from the
+/// tile's corner; it is covered iff `u < w * 4096` and `v < h * 4096` as unsigned 32-bit numbers.
+///
+/// Half-open in the tile's own frame: two abutting tiles of one axis-parallel angle never double or drop a pixel.
+/// Everything fits 32 bits inside the box, whatever the size of the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Tile {
+    /// Left column of the bounding box, clipped to the canvas; the box is empty if `x0 > x1`.
+    pub x0: i32,
+    /// Top row of the box.
+    pub y0: i32,
+    /// Right column of the box, inclusive.
+    pub x1: i32,
+    /// Bottom row of the box, inclusive.
+    pub y1: i32,
+    /// Tile coordinate u of the pixel at the box's corner, from the tile's left side.
+    pub u0: i32,
+    /// Tile coordinate v of the pixel at the box's corner, from the tile's top side.
+    pub v0: i32,
+    /// Change of u per column and of v per row.
+    pub cos: i32,
+    /// Change of u per row; v changes by its negative per column.
+    pub sin: i32,
+    /// Width, in 4096ths of the unit of u.
+    pub w: u32,
+    /// Height, in 4096ths of the unit of v.
+    pub h: u32,
+    /// 8-bit sRGB colour: red in the lowest byte, then green, then blue.
+    pub color: u32,
+    /// Layer of the mask set; 0 is the full square and is never looked up.
+    pub mask: u32,
+}
+
+/// What a population is drawn on: its size, and how many canvas pixels one picture pixel spans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Canvas {
+    /// Width in px.
+    pub width_px: u32,
+    /// Height in px.
+    pub height_px: u32,
+    /// Scale as a fraction, `scale.0 / scale.1`; 1 / 1 at evaluation size.
+    pub scale: (u32, u32),
+}
+
+impl Canvas {
+    /// The canvas at evaluation size, one to one.
+    #[must_use]
+    pub fn evaluation(width_px: u32, height_px: u32) -> Self {
+        Self { width_px, height_px, scale: (1, 1) }
+    }
+
+    /// The canvas whose longer side is `long_side_px` for a picture of `width_px` x `height_px`; the other side is
+    /// rounded to the nearest whole pixel, at least 1.
+    #[must_use]
+    pub fn scaled(width_px: u32, height_px: u32, long_side_px: u32) -> Self {
+        let long = width_px.max(height_px);
+        let side = |px: u32| round_half_up(i64::from(px) * i64::from(long_side_px), i64::from(long)).max(1) as u32;
+        Self { width_px: side(width_px), height_px: side(height_px), scale: (long_side_px, long) }
+    }
+
+    /// This canvas with `factor` x `factor` samples for each of its pixels.
+    #[must_use]
+    pub fn supersampled(self, factor: u32) -> Self {
+        Self {
+            width_px: self.width_px * factor,
+            height_px: self.height_px * factor,
+            scale: (self.scale.0 * factor, self.scale.1),
+        }
+    }
+}
+
+impl Tile {
+    /// A tile that covers nothing.
+    pub const EMPTY: Self =
+        Self { x0: 1, y0: 1, x1: 0, y1: 0, u0: 0, v0: 0, cos: 0, sin: 0, w: 0, h: 0, color: 0, mask: 0 };
+
+    /// The tile of `fly` on `canvas`; [`Tile::EMPTY`] if the fly is absent or its tile misses the canvas.
+    ///
+    /// Each tile is measured in the finest unit (1/64 px, 1/32 px, ... 1 px) in which its sides fit 18 bits; at
+    /// evaluation size that is always 1/64 px. A side beyond 2^18 px of the canvas counts as 2^18 px.
+    #[must_use]
+    pub fn bake(fly: &Fly, canvas: &Canvas) -> Self {
+        if !fly.alive {
+            return Self::EMPTY;
+        }
+        let (numerator, denominator) = (i64::from(canvas.scale.0), i64::from(canvas.scale.1));
+        let longest = i64::from(fly.w.max(fly.h)) * numerator;
+        let coarseness = (0..6).find(|&k| round_half_up(longest, denominator << k) <= i64::from(SIDE_MAX)).unwrap_or(6);
+        let unit = i64::from(UNITS_PER_PX) >> coarseness;
+        let divisor = denominator << coarseness;
+        // A centre x of the picture lies at s * (x + 1/2) - 1/2 on the canvas.
+        let half_px = i64::from(UNITS_PER_PX) / 2;
+        let centre = |x: i32| round_half_up((i64::from(x) + half_px) * numerator - half_px * denominator, divisor);
+        let side = |w: u32| round_half_up(i64::from(w) * numerator, divisor).clamp(1, i64::from(SIDE_MAX));
+        let (x, y, w, h) = (centre(fly.x), centre(fly.y), side(fly.w), side(fly.h));
+
+        let (cos, sin) = cos_sin(fly.angle);
+        let (cos, sin) = (i64::from(cos), i64::from(sin));
+        let (x0, x1) = clip(x, half_extent(cos, sin, w, h), unit, canvas.width_px);
+        let (y0, y1) = clip(y, half_extent(sin, cos, w, h), unit, canvas.height_px);
+        if x0 > x1 || y0 > y1 {
+            return Self::EMPTY;
+        }
+        let (dx, dy) = (x0 * unit - x, y0 * unit - y);
+        let half = i64::from(TRIG_ONE) / 2;
+        Self {
+            x0: x0 as i32,
+            y0: y0 as i32,
+            x1: x1 as i32,
+            y1: y1 as i32,
+            u0: (dx * cos + dy * sin + w * half) as i32,
+            v0: (dy * cos - dx * sin + h * half) as i32,
+            cos: (cos * unit) as i32,
+            sin: (sin * unit) as i32,
+            w: w as u32,
+            h: h as u32,
+            color: pack(fly.color()),
+            mask: u32::from(fly.mask),
+        }
+    }
+
+    /// Whether no pixel can be covered.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.x0 > self.x1
+    }
+
+    /// The width in units of u: a pixel is covered iff its u is below this, and its v below [`Tile::v_end`].
+    #[inline]
+    #[must_use]
+    pub fn u_end(&self) -> u32 {
+        self.w * TRIG_ONE as u32
+    }
+
+    /// The height in units of v.
+    #[inline]
+    #[must_use]
+    pub fn v_end(&self) -> u32 {
+        self.h * TRIG_ONE as u32
+    }
+
+    /// Tile coordinates `(u, v)` of pixel `(i, j)`, as the unsigned numbers that the coverage test compares.
+    ///
+    /// Exact inside the box and up to a few dozen pixels around it; further away the 32 bits may wrap.
+    #[inline]
+    #[must_use]
+    pub fn coordinates(&self, i: i32, j: i32) -> (u32, u32) {
+        let (di, dj) = (i.wrapping_sub(self.x0), j.wrapping_sub(self.y0));
+        let u = self.u0.wrapping_add(di.wrapping_mul(self.cos)).wrapping_add(dj.wrapping_mul(self.sin));
+        let v = self.v0.wrapping_sub(di.wrapping_mul(self.sin)).wrapping_add(dj.wrapping_mul(self.cos));
+        (u as u32, v as u32)
+    }
+
+    /// The mask texel (column, row) at tile coordinates `(u, v)` of a covered pixel.
+    ///
+    /// `floor(u * 256 / (w * 4096))`, exactly, in 32 bits.
+    #[inline]
+    #[must_use]
+    pub fn texel(&self, u: u32, v: u32) -> (u32, u32) {
+        const STEPS_PER_TEXEL: u32 = TRIG_ONE as u32 / MASK_SIDE as u32;
+        ((u / STEPS_PER_TEXEL) / self.w, (v / STEPS_PER_TEXEL) / self.h)
+    }
+}
+
+impl Fly {
+    /// The colour as stored in pictures: 8 bits a channel, rounded.
+    #[must_use]
+    pub fn color(&self) -> Rgb {
+        [self.r, self.g, self.b].map(|channel| ((u32::from(channel) * 255 + 32_767) / 65_535) as u8)
+    }
+}
+
+/// A colour in one word: red in the lowest byte, then green, then blue; the highest byte is 0.
+#[inline]
+#[must_use]
+pub fn pack(color: Rgb) -> u32 {
+    u32::from_le_bytes([color[0], color[1], color[2], 0])
+}
+
+/// The colour that [`pack`] packed; the highest byte is ignored.
+#[inline]
+#[must_use]
+pub fn unpack(word: u32) -> Rgb {
+    let [r, g, b, _] = word.to_le_bytes();
+    [r, g, b]
+}
+
+/// `value / divisor` for a positive divisor, rounded to the nearest integer, halves up.
+fn round_half_up(value: i64, divisor: i64) -> i64 {
+    (2 * value + divisor).div_euclid(2 * divisor)
+}
+
+/// Half of the tile's extent along one axis, rounded up: the table's sine and cosine are rounded, so the map is up to
+/// 1/2900 smaller than a rotation, which the second term covers.
+fn half_extent(along: i64, across: i64, w: i64, h: i64) -> i64 {
+    let sum = along.abs() * w + across.abs() * h;
+    (sum >> 13) + (sum >> 23) + 2
+}
+
+/// First and last pixel within `half` of `centre`, clipped to `0..side_px`.
+fn clip(centre: i64, half: i64, unit: i64, side_px: u32) -> (i64, i64) {
+    let first = (centre - half + unit - 1).div_euclid(unit).max(0);
+    let last = (centre + half).div_euclid(unit).min(i64::from(side_px) - 1);
+    (first, last)
+}
