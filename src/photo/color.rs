@@ -68,7 +68,7 @@ impl Rows {
         RgbImage::from_raw(width_px, height_px, opaque).expect("every row has been converted")
     }
 
-    /// One pixel over the background, in 8 bits, rounded once: with 8-bit input this is `(c*a + b*(255-a) + 127) / 255`.
+    /// One pixel over the background, rounded once to 8 bits: for 8-bit input `(c*a + b*(255-a) + 127) / 255`.
     fn composite(&self, [r, g, b, alpha]: [u16; 4]) -> [u8; 3] {
         let alpha = u64::from(alpha);
         let over = |channel: u16, behind: u8| {

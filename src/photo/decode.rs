@@ -28,7 +28,8 @@ const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP and GIF";
 pub struct ReadOptions {
     /// 8-bit sRGB colour that shows through where the picture is transparent.
     pub background: [u8; 3],
-    /// Size in px that the longer side is reduced to; smaller pictures stay as they are. At least 1; `None` keeps the size.
+    /// Size in px, at least 1, that the longer side is reduced to; smaller pictures stay as they are, and with `None`
+    /// all do.
     pub long_side_px: Option<u32>,
 }
 

@@ -1,9 +1,8 @@
 //! ICC profiles: what the numbers of a picture mean, turned into sRGB.
 //!
 //! Cameras, editors and phones embed curves and a matrix. Those are evaluated here, in double precision and with the
-//! powers of `libm`, since `moxcms` fuses multiplications where the processor can and so rounds differently from machine
-//! to machine (measured: 17 of 48 million channels). It still parses every profile, and evaluates the rare ones that are
-//! tables, such as scanners'.
+//! powers of `libm`: `moxcms` fuses multiplications where the processor can, and so rounds differently from machine to
+//! machine. It still parses every profile, and evaluates the rare ones that are only tables, such as scanners'.
 
 use std::sync::Arc;
 
@@ -16,8 +15,8 @@ const SRGB_FROM_XYZ: [[f64; 3]; 3] = [
     [0.071_945_3, -0.228_991_4, 1.405_242_7],
 ];
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// Profiles round the primaries of sRGB in their own ways. What is as near as this to sRGB is taken as sRGB, so that the
-/// commonest profile of all changes no pixel.
+/// Profiles round the primaries of sRGB in their own ways. What is as near as this to sRGB is taken as sRGB, so that
+/// the commonest profile of all changes no pixel.
 const SRGB_TOLERANCE: f64 = 1e-3;
 /// Steps of a 16-bit channel.
 const STEPS: usize = 65_535;

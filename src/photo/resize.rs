@@ -1,7 +1,7 @@
 //! Reducing a picture with Lanczos3.
 //!
-//! Weights are computed in double precision with the sine of `libm`, then rounded to integers; sums are integers. So the
-//! pixels do not depend on the machine, and the SIMD paths of `fast_image_resize` give what its plain path gives (a
+//! Weights are computed in double precision with the sine of `libm`, then rounded to integers; sums are integers. So
+//! the pixels do not depend on the machine, and the SIMD paths of `fast_image_resize` give what its plain path gives (a
 //! test compares them).
 
 use std::f64::consts::PI;

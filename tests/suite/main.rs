@@ -4,5 +4,6 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test that it is in")]
 
 mod exactness;
+mod files;
 mod reference;
 mod scenarios;
