@@ -26,8 +26,8 @@ pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value
     let fly_count = population.flies.len();
     if fly_count != fitness.len() || fly_count > FLY_COUNT_MAX {
         return Err(Error::Usage(format!(
-            "a population of {fly_count} flies with {} values of fitness cannot be written: there must be one value per \
-             fly, and at most {FLY_COUNT_MAX} flies",
+            "a population of {fly_count} flies with {} values of fitness cannot be written: each fly needs one, and \
+             there may be at most {FLY_COUNT_MAX}",
             fitness.len()
         )));
     }
@@ -114,10 +114,12 @@ impl Members {
         values: impl Iterator<Item = T>,
     ) -> zip::result::ZipResult<()> {
         let dtype = DType::Plain(type_string.parse().expect("the type strings of this file are valid"));
-        self.start(&npyz::npz::file_name_from_array_name(name))?;
-        let mut array = npyz::WriteOptions::new().dtype(dtype).shape(shape).writer(&mut self.zip).begin_nd()?;
+        // Built whole: value by value, the compressor would be called a million times.
+        let mut bytes = Vec::new();
+        let mut array = npyz::WriteOptions::new().dtype(dtype).shape(shape).writer(&mut bytes).begin_nd()?;
         array.extend(values)?;
         array.finish()?;
-        Ok(())
+        self.start(&npyz::npz::file_name_from_array_name(name))?;
+        Ok(self.zip.write_all(&bytes)?)
     }
 }

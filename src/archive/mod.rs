@@ -1,9 +1,9 @@
 //! Populations as `.npz` files: what a run found, to be redrawn at any size, continued, or opened with numpy.
 //!
 //! One array per gene (`x y z r g b w h angle`, f32), `fitness` (i64), `mask` (u16), `alive` (bool), the mask layers as
-//! `mask_0`, `mask_1`, ... (u8, 256x256x2: coverage and shade), and `meta.json`. `numpy.load` opens it with no code. Files
-//! have fixed dates, order and compression: the same population gives the same bytes, and save, load, save changes
-//! nothing.
+//! `mask_0`, `mask_1`, ... (u8, 256x256x2: coverage and shade), and `meta.json`. `numpy.load` opens it with no code.
+//! Files have fixed dates, order and compression: the same population gives the same bytes, and save, load, save
+//! changes nothing.
 
 mod encode;
 mod read;

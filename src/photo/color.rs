@@ -2,10 +2,9 @@
 //!
 //! A row at a time in 16 bits per channel, so that a 16-bit picture in a linear profile keeps its shadows.
 
-use std::sync::Arc;
-
 use image::{DynamicImage, ImageBuffer, Pixel, RgbImage};
-use moxcms::{ColorProfile, DataColorSpace, Layout, Transform16BitExecutor, TransformOptions};
+
+use super::icc::Profile;
 
 /// The picture without its profile and its alpha; transparent pixels show `background`.
 ///
@@ -44,55 +43,6 @@ fn quantised(channel: f32) -> u16 {
     (channel * 65_535.0 + 0.5) as u16
 }
 
-/// What a channel means.
-enum Profile {
-    Srgb,
-    Rgb(Arc<Transform16BitExecutor>),
-    Gray(Arc<Transform16BitExecutor>),
-}
-
-impl Profile {
-    /// The profile in `icc` for a picture that has colour or is grey, or why it cannot be used.
-    fn parse(icc: &[u8], has_color: bool) -> Result<Self, String> {
-        let profile = ColorProfile::new_from_slice(icc).map_err(|error| format!("it is broken ({error})"))?;
-        let srgb = ColorProfile::new_srgb();
-        let transform = |from, to| {
-            let options = TransformOptions { prefer_fixed_point: false, ..TransformOptions::default() };
-            profile
-                .create_transform_16bit(from, &srgb, to, options)
-                .map_err(|error| format!("it is not usable ({error})"))
-        };
-        match (profile.color_space, has_color) {
-            (DataColorSpace::Rgb, _) => transform(Layout::Rgba, Layout::Rgba).map(Self::Rgb),
-            (DataColorSpace::Gray, false) => transform(Layout::Gray, Layout::Rgb).map(Self::Gray),
-            (other, _) => Err(format!("it is for {other:?} pixels; save the picture as sRGB")),
-        }
-    }
-
-    /// Brings a row of RGBA pixels to sRGB; alpha stays.
-    fn apply(&self, row: &mut [[u16; 4]], scratch: &mut Vec<u16>) {
-        let done = match self {
-            Self::Srgb => Ok(()),
-            Self::Rgb(transform) => {
-                scratch.clear();
-                scratch.extend_from_slice(row.as_flattened());
-                transform.transform(scratch, row.as_flattened_mut())
-            }
-            Self::Gray(transform) => {
-                let gray: Vec<u16> = row.iter().map(|pixel| pixel[0]).collect();
-                scratch.clear();
-                scratch.resize(gray.len() * 3, 0);
-                let done = transform.transform(&gray, scratch);
-                for (pixel, rgb) in row.iter_mut().zip(scratch.as_chunks::<3>().0) {
-                    pixel[..3].copy_from_slice(rgb);
-                }
-                done
-            }
-        };
-        done.expect("source and destination hold one row each");
-    }
-}
-
 /// How every row is brought to opaque 8-bit sRGB.
 struct Rows {
     profile: Profile,
@@ -118,7 +68,7 @@ impl Rows {
         RgbImage::from_raw(width_px, height_px, opaque).expect("every row has been converted")
     }
 
-    /// One pixel over the background, in 8 bits, rounded once: with 8-bit input this is `(c*a + b*(255-a) + 127) / 255`.
+    /// One pixel over the background, rounded once to 8 bits: for 8-bit input `(c*a + b*(255-a) + 127) / 255`.
     fn composite(&self, [r, g, b, alpha]: [u16; 4]) -> [u8; 3] {
         let alpha = u64::from(alpha);
         let over = |channel: u16, behind: u8| {

@@ -28,7 +28,8 @@ const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP and GIF";
 pub struct ReadOptions {
     /// 8-bit sRGB colour that shows through where the picture is transparent.
     pub background: [u8; 3],
-    /// Size in px that the longer side is reduced to; smaller pictures stay as they are. At least 1; `None` keeps the size.
+    /// Size in px, at least 1, that the longer side is reduced to; smaller pictures stay as they are, and with `None`
+    /// all do.
     pub long_side_px: Option<u32>,
 }
 
@@ -50,8 +51,9 @@ pub struct Loaded {
 /// Reads the picture at `path`; its content, not its name, tells the format.
 ///
 /// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
-/// background, 8 bits, EXIF orientation, Lanczos3 to the size asked for. Decoded bytes are the same on every x86-64
-/// machine; on other processors an ICC profile may round a channel by one.
+/// background, 8 bits, EXIF orientation, Lanczos3 to the size asked for. The bytes are the same on every machine,
+/// but for an ICC profile that has tables and no matrix: there a processor's fused multiplications may round a channel
+/// by one.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, or exceeds

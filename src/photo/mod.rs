@@ -7,6 +7,7 @@
 mod color;
 mod decode;
 mod encode;
+mod icc;
 mod jpeg_segments;
 mod metadata;
 mod resize;
