@@ -101,7 +101,7 @@ fn saving_what_was_loaded_gives_the_same_bytes_and_always_the_same() {
     let bytes = ours();
     let archive = read_bytes(&bytes).expect("it is ours");
     assert!(encode(&archive.population, &archive.fitness, &archive.meta).expect("it can be encoded") == bytes);
-    assert_eq!(short_hash(&bytes), "d2ba4f7c6641d98d");
+    assert_eq!(short_hash(&bytes), "7bc374764010e815");
 }
 
 #[test]
@@ -296,7 +296,7 @@ fn damaged_bytes_never_bring_the_reader_down() {
     let whole = ours();
     for place in noise(300).as_chunks::<3>().0 {
         let mut damaged = whole.clone();
-        let offset = (usize::from(place[0]) << 8 | usize::from(place[1])) * whole.len() >> 16;
+        let offset = usize::from(u16::from_be_bytes([place[0], place[1]])) * whole.len() / 65_536;
         damaged[offset] ^= place[2] | 1;
         // Either answer is right: some bytes do not matter.
         let _ = read_bytes(&damaged);
