@@ -4,6 +4,7 @@
 // The tile list of a block comes nearest first, so the first tile that covers a pixel is its top and the second its
 // under. Sums are kept by taking off what the block added last time and adding what it adds now.
 #version 460
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_EXT_samplerless_texture_functions : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -15,6 +16,11 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint BLOCK_SIDE = 8u;
 layout(constant_id = 2) const uint PIXELS_PER_THREAD = 8u;
+// 1: some tiles wear a mask other than the square. Software Vulkan runs both sides of a branch, so the look-ups must not
+// even be there when no tile needs them.
+layout(constant_id = 4) const uint MASKED = 1u;
+// 1: sums may not fit 32 bits, so carries go to the high word.
+layout(constant_id = 5) const uint WIDE_SUMS = 1u;
 // 1: only the SAE of the top layer, with one fly left out: a plain re-render, the baseline of the benches.
 layout(constant_id = 3) const uint RE_RENDER = 0u;
 
@@ -72,7 +78,7 @@ void add_marginal(uint fly, int part) {
     }
     uint low = atomicAdd(marginal[2u * fly], uint(part));
     int carry = (part >> 31) + (low + uint(part) < low ? 1 : 0);
-    if (carry != 0) {
+    if (WIDE_SUMS == 1u && carry != 0) {
         atomicAdd(marginal[2u * fly + 1u], uint(carry));
     }
 }
@@ -83,7 +89,7 @@ void add_sum(uint sum, int part) {
     }
     uint low = atomicAdd(sums[2u * sum], uint(part));
     int carry = (part >> 31) + (low + uint(part) < low ? 1 : 0);
-    if (carry != 0) {
+    if (WIDE_SUMS == 1u && carry != 0) {
         atomicAdd(sums[2u * sum + 1u], uint(carry));
     }
 }
@@ -98,7 +104,7 @@ uint shown_color(Lane lane, uint fly, int i, int j) {
         return lane.background;
     }
     Tile tile = tiles[lane.first_fly + fly];
-    if (tile.mask == 0u) {
+    if (MASKED == 0u || tile.mask == 0u) {
         return tile.color;
     }
     return shaded(tile.color, mask_texel(lane, tile, tile_coordinates(tile, i, j)).y);
@@ -120,7 +126,7 @@ void main() {
     uint top[PIXELS_PER_THREAD];
     uint under[PIXELS_PER_THREAD];
     bool continued = (item.flags & FLAG_CONTINUED) != 0u;
-    for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
+    [[unroll]] for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
         top[p] = continued ? top_layer[first_pixel + p * BLOCK_SIDE] : NO_FLY;
         under[p] = continued ? under_layer[first_pixel + p * BLOCK_SIDE] : NO_FLY;
     }
@@ -134,12 +140,10 @@ void main() {
         uvec2 end = uvec2(tile.w << 12, tile.h << 12);
         uvec2 uv = tile_coordinates(tile, i, j);
         bool open = false;
-        for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
+        [[unroll]] for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
             bool covered = uv.x < end.x && uv.y < end.y;
-            if (tile.mask != 0u) {
-                if (covered) {
-                    covered = mask_texel(lane, tile, uv).x >= COVERAGE_THRESHOLD;
-                }
+            if (MASKED == 1u && covered && tile.mask != 0u) {
+                covered = mask_texel(lane, tile, uv).x >= COVERAGE_THRESHOLD;
             }
             uint candidate = covered ? fly : NO_FLY;
             if (RE_RENDER == 0u) {
@@ -160,7 +164,7 @@ void main() {
     bool fresh = (item.flags & FLAG_FRESH) != 0u;
     bool unfinished = (item.flags & FLAG_UNFINISHED) != 0u;
     int error_change = 0;
-    for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
+    [[unroll]] for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
         uint pixel = first_pixel + p * BLOCK_SIDE;
         uint target = targets[pixel];
         bool inside = (target & INSIDE) != 0u;

@@ -27,8 +27,9 @@ pub struct KernelShape {
 }
 
 impl KernelShape {
-    /// The shape for a class of devices: on software Vulkan the fastest of `cargo bench --bench kernel_shape`; for
-    /// hardware, one that fills a warp or a wave.
+    /// The shape for a class of devices. On software Vulkan small blocks make births cheapest (`cargo bench --bench
+    /// paper_run`; for whole pictures alone, 16 and 8 is a quarter faster: `cargo bench --bench kernel_shape`). For
+    /// hardware, a shape that fills a warp or a wave, not yet tuned on one.
     #[must_use]
     pub fn for_device(kind: DeviceKind) -> Self {
         match kind {
@@ -42,10 +43,46 @@ impl KernelShape {
     pub fn block_pixels(self) -> usize {
         (self.block_side_px * self.block_side_px) as usize
     }
+}
 
-    fn specialization(self, mode: Mode) -> [(u32, u32); 4] {
-        let threads = self.block_side_px * self.block_side_px / self.pixels_per_thread;
-        [(0, threads), (1, self.block_side_px), (2, self.pixels_per_thread), (3, mode as u32)]
+/// A variant of the kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Variant {
+    pub shape: KernelShape,
+    pub mode: Mode,
+    /// Whether any lane has masks besides the square.
+    pub masked: bool,
+    /// Whether any sum may not fit 32 bits.
+    pub wide_sums: bool,
+}
+
+impl Variant {
+    /// The leanest variant that is right for these lanes.
+    fn for_lanes(lanes: &[Lane], shape: KernelShape) -> Self {
+        /// A pixel adds at most 3 * 255 to a sum.
+        const NARROW_PIXELS: u64 = (1 << 31) / 765;
+        let pixels = |lane: &Lane| {
+            let target = &lane.scene().target;
+            u64::from(target.width_px()) * u64::from(target.height_px())
+        };
+        Self {
+            shape,
+            mode: Mode::Evaluate,
+            masked: lanes.iter().any(|lane| lane.scene().masks.layers().len() > 1),
+            wide_sums: lanes.iter().any(|lane| pixels(lane) > NARROW_PIXELS),
+        }
+    }
+
+    fn specialization(self) -> [(u32, u32); 6] {
+        let KernelShape { block_side_px, pixels_per_thread } = self.shape;
+        [
+            (0, block_side_px * block_side_px / pixels_per_thread),
+            (1, block_side_px),
+            (2, pixels_per_thread),
+            (3, self.mode as u32),
+            (4, u32::from(self.masked)),
+            (5, u32::from(self.wide_sums)),
+        ]
     }
 }
 
@@ -69,7 +106,7 @@ pub(super) struct LaneSpan {
 
 /// Pipeline and buffers of the pass.
 pub(super) struct EvaluatePass {
-    pub shape: KernelShape,
+    pub variant: Variant,
     pub spans: Vec<LaneSpan>,
     pub tiles: Arc<Buffer>,
     pub top: Arc<Buffer>,
@@ -105,7 +142,8 @@ impl EvaluatePass {
             Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
         };
         let masks = create_masks(device, recorder, lanes.iter().map(|lane| &*lane.scene().masks))?;
-        let pipeline = create_pipeline(device, shape, Mode::Evaluate)?;
+        let variant = Variant::for_lanes(lanes, shape);
+        let pipeline = create_pipeline(device, variant)?;
         let buffers = [
             storage("lanes", lanes.len() * size_of::<LaneRecord>())?,
             storage("work", block_count * size_of::<WorkItem>())?,
@@ -129,7 +167,7 @@ impl EvaluatePass {
             )?;
         }
         Ok(Self {
-            shape,
+            variant,
             spans,
             tiles,
             top,
@@ -194,8 +232,8 @@ impl EvaluatePass {
     }
 }
 
-/// The kernel in one of its modes.
-pub(super) fn create_pipeline(device: &Arc<Device>, shape: KernelShape, mode: Mode) -> Result<Arc<ComputePipeline>> {
+/// The kernel in one of its variants.
+pub(super) fn create_pipeline(device: &Arc<Device>, variant: Variant) -> Result<Arc<ComputePipeline>> {
     let mut bindings = [BindingKind::StorageBuffer; 11];
     bindings[10] = BindingKind::SampledImage;
     ComputePipeline::create(
@@ -203,7 +241,7 @@ pub(super) fn create_pipeline(device: &Arc<Device>, shape: KernelShape, mode: Mo
         &ComputeShader {
             name: "evaluate",
             spirv: &shaders::words(shaders::EVALUATE),
-            specialization: &shape.specialization(mode),
+            specialization: &variant.specialization(),
             bindings: &bindings,
             push_constant_bytes: size_of::<EvaluatePush>() as u32,
         },

@@ -170,6 +170,11 @@ impl GpuEvaluator {
             let fitness = &mut self.fitness[lane];
             recorder.read_into(&marginal, bytemuck::cast_slice_mut(&mut fitness.marginal))?;
             recorder.read_into(&sum, bytemuck::bytes_of_mut(&mut fitness.sae))?;
+            if !pass.variant.wide_sums {
+                // Only the low words count.
+                fitness.marginal.iter_mut().for_each(|marginal| *marginal = i64::from(*marginal as i32));
+                fitness.sae &= u64::from(u32::MAX);
+            }
         }
         work.items.clear();
         work.entries.clear();
@@ -177,7 +182,7 @@ impl GpuEvaluator {
     }
 
     pub(super) fn block_pixels(&self) -> usize {
-        self.pass.shape.block_pixels()
+        self.pass.variant.shape.block_pixels()
     }
 
     /// One layer of a lane, read back and put in rows.
@@ -188,7 +193,7 @@ impl GpuEvaluator {
         let mut blocked = vec![0_u32; span.pixel_count];
         self.recorder.read_into(&ticket, bytemuck::cast_slice_mut(&mut blocked))?;
         let (target, lists) = (&self.lanes[lane].scene().target, self.lanes[lane].lists());
-        let (side, columns) = (self.pass.shape.block_side_px, lists.columns());
+        let (side, columns) = (self.pass.variant.shape.block_side_px, lists.columns());
         let place = |i: u32, j: u32| {
             let block = (j / side * columns + i / side) as usize;
             block * (side * side) as usize + (j % side * side + i % side) as usize

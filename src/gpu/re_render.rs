@@ -2,7 +2,7 @@
 //! `cargo bench --bench leave_one_out`.
 
 use super::GpuEvaluator;
-use super::evaluate_pass::{Mode, create_pipeline};
+use super::evaluate_pass::{Mode, Variant, create_pipeline};
 use super::layout::EvaluatePush;
 use crate::error::{Error, Result};
 use crate::model::Evaluator;
@@ -32,7 +32,7 @@ impl GpuEvaluator {
 
         let bytes = u64::from(fly_count) * 8;
         let sums = Buffer::create(&self.device, "re-render sums", bytes, BufferUse::Storage, Residence::Device)?;
-        let pipeline = create_pipeline(&self.device, self.pass.shape, Mode::ReRender)?;
+        let pipeline = create_pipeline(&self.device, Variant { mode: Mode::ReRender, ..self.pass.variant })?;
         let group = self.pass.bind_with_sums(&pipeline, &sums)?;
         self.recorder.write_buffer(&sums, 0, &vec![0; bytes as usize])?;
         for first in (0..fly_count).step_by(RE_RENDERS_PER_SUBMISSION as usize) {
@@ -49,6 +49,7 @@ impl GpuEvaluator {
         let mut without = vec![0_u64; fly_count as usize];
         self.recorder.read_into(&ticket, bytemuck::cast_slice_mut(&mut without))?;
         let sae = self.evaluation(0).sae;
+        // The high words of narrow sums stay 0, and an SAE is never negative.
         Ok(without.into_iter().map(|without| without as i64 - sae as i64).collect())
     }
 }

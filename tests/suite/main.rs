@@ -7,6 +7,7 @@ mod canary;
 mod cli;
 mod cli_interrupts;
 mod cli_refusals;
+mod determinism;
 mod exactness;
 mod files;
 mod layering;

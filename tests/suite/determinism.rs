@@ -1,0 +1,86 @@
+//! Same picture, options and seed: the same population and the same pixels, whatever evaluates and however.
+
+use smalti::cpu::CpuEvaluator;
+use smalti::engine::{Engine, Undisturbed};
+use smalti::evolve::evolution::random_population;
+use smalti::evolve::{Evolution, Outcome, PaperScheme};
+use smalti::gpu::GpuEvaluator;
+use smalti::model::{Canvas, Evaluator, Fly, Mosaic, Population, Scene};
+use smalti::vk::DeviceOptions;
+
+use crate::canary;
+use crate::scenarios::{random_scene, stream};
+
+/// All that an evolution leads to.
+type Result = (Vec<Fly>, u64, Vec<i64>, Outcome, Mosaic);
+
+fn evolve(evaluator: Box<dyn Evaluator>, scheme: PaperScheme) -> Result {
+    let scene = evaluator.scene(0).clone();
+    let (width_px, height_px) = (scene.target.width_px(), scene.target.height_px());
+    let flies = random_population(width_px, height_px, scene.fly_count, scheme.seed);
+    let mut engine = Engine::new(evaluator, vec![Evolution::new(scheme, 0, width_px, height_px, flies)]);
+    engine.run(&mut Undisturbed).expect("the evaluator works");
+    let evolution = &engine.evolutions()[0];
+    let (best, sae) = (evolution.best_flies().to_vec(), evolution.best_sae().expect("it was evaluated"));
+    let outcome = evolution.outcome();
+    let population = Population {
+        width_px,
+        height_px,
+        background: scene.background,
+        masks: (*scene.masks).clone(),
+        flies: best.clone(),
+    };
+    let evaluation = engine.evaluator().evaluation(0);
+    assert_eq!(evaluation.sae, sae, "the best population is loaded when the evolution has ended");
+    let marginal = evaluation.marginal.to_vec();
+    let canvas = Canvas::scaled(width_px, height_px, 150);
+    let mosaic = engine.evaluator().draw(&population, &canvas, 2).expect("the evaluator works");
+    (best, sae, marginal, outcome, mosaic)
+}
+
+fn scene() -> Scene {
+    random_scene(60, 44, 150, &mut stream(8))
+}
+
+fn on_threads(threads: usize, scheme: &PaperScheme) -> Result {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a small pool");
+    pool.install(|| evolve(Box::new(CpuEvaluator::new(vec![scene()])), scheme.clone()))
+}
+
+fn check_everywhere(scheme: &PaperScheme) {
+    let one = on_threads(1, scheme);
+    assert_eq!(one, on_threads(2, scheme), "two threads");
+    let vulkan = canary::with_device(&DeviceOptions::default(), |device| {
+        evolve(Box::new(GpuEvaluator::create(&device, vec![scene()]).expect("it fits")), scheme.clone())
+    });
+    assert_eq!(one, vulkan, "software Vulkan");
+    let other_seed = on_threads(1, &PaperScheme { seed: scheme.seed + 1, ..scheme.clone() });
+    assert_ne!(one.0, other_seed.0, "the seed matters");
+}
+
+#[test]
+fn births_one_by_one_lead_to_the_same_mosaic_everywhere() {
+    check_everywhere(&PaperScheme { seed: 3, births: 1_500, ..PaperScheme::default() });
+}
+
+#[test]
+fn batches_of_births_with_cooling_restarts_lead_to_the_same_mosaic_everywhere() {
+    let scheme = PaperScheme {
+        seed: 4,
+        births: 2_000,
+        restarts: 2,
+        cool_q16: 1 << 15,
+        batch_births: 7,
+        ..PaperScheme::default()
+    };
+    check_everywhere(&scheme);
+}
+
+#[test]
+fn evolution_lowers_the_error_and_restarts_never_lose_the_best() {
+    let run = |restarts| on_threads(1, &PaperScheme { births: 1_000, restarts, ..PaperScheme::default() }).1;
+    let first = on_threads(1, &PaperScheme { births: 0, ..PaperScheme::default() }).1;
+    let saes = [first, run(0), run(1), run(2)];
+    assert!(saes[1] < first, "{saes:?}");
+    assert!(saes.is_sorted_by(|a, b| a >= b), "{saes:?}");
+}
