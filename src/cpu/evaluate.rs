@@ -16,6 +16,8 @@ const SIDE: usize = 8;
 const PIXELS: usize = SIDE * SIDE;
 /// From this many stale blocks on, sharing them among threads pays for itself.
 const PARALLEL_FROM: usize = 128;
+/// After so many tiles it is worth a look whether every pixel has its top and under.
+const LOOK_EVERY: u32 = 4;
 /// Highest byte of a target pixel inside the picture; 0 marks the overhang of blocks at the edges.
 const INSIDE: u32 = 0xFF00_0000;
 
@@ -31,11 +33,13 @@ struct Block {
     parts: Vec<(u32, i32)>,
     /// What the block adds to the SAE.
     error: u32,
+    /// Depth key of the tile with which every pixel had its top and under; what lies behind it changes nothing.
+    closed_at: u64,
 }
 
 impl Default for Block {
     fn default() -> Self {
-        Self { top: [NO_FLY; PIXELS], under: [NO_FLY; PIXELS], parts: Vec::new(), error: 0 }
+        Self { top: [NO_FLY; PIXELS], under: [NO_FLY; PIXELS], parts: Vec::new(), error: 0, closed_at: u64::MAX }
     }
 }
 
@@ -47,6 +51,8 @@ pub(super) struct LaneEvaluation {
     blocks: Vec<Block>,
     marginal: Vec<i64>,
     sae: u64,
+    /// Blocks to refresh; empty between calls.
+    stale: Vec<u32>,
 }
 
 impl LaneEvaluation {
@@ -55,7 +61,7 @@ impl LaneEvaluation {
         let lane = Lane::new(scene, SIDE as u32);
         let target = target_blocks(&lane);
         let blocks = vec![Block::default(); lane.lists().block_count()];
-        Self { lane, target, blocks, marginal: vec![0; fly_count], sae: 0 }
+        Self { lane, target, blocks, marginal: vec![0; fly_count], sae: 0, stale: Vec::new() }
     }
 
     pub(super) fn scene(&self) -> &Scene {
@@ -84,20 +90,22 @@ impl LaneEvaluation {
         self.lane.replace(index, fly);
     }
 
-    /// Refreshes the stale blocks: takes their old parts off the sums and adds the new ones.
+    /// Refreshes the touched blocks in which a change can show: takes their old parts off the sums and adds the new ones.
     pub(super) fn refresh_touched(&mut self) {
         let (lane, target) = (&self.lane, &self.target);
-        let touched = lane.touched();
-        if touched.len() < PARALLEL_FROM {
+        let shows = |number: u32| lane.nearest_change(number as usize) <= self.blocks[number as usize].closed_at;
+        self.stale.extend(lane.touched().iter().copied().filter(|&number| shows(number)));
+        if self.stale.len() < PARALLEL_FROM {
             let mut palette = Palette::default();
-            for &number in touched {
+            for &number in &self.stale {
                 let block = &mut self.blocks[number as usize];
                 subtract_parts(block, &mut self.marginal, &mut self.sae);
                 refresh(lane, number as usize, &target[number as usize], block, &mut palette);
                 add_parts(block, &mut self.marginal, &mut self.sae);
             }
         } else {
-            let refreshed: Vec<Block> = touched
+            let refreshed: Vec<Block> = self
+                .stale
                 .par_iter()
                 .with_min_len(PARALLEL_FROM / 2)
                 .map_init(Palette::default, |palette, &number| {
@@ -106,13 +114,14 @@ impl LaneEvaluation {
                     block
                 })
                 .collect();
-            for (&number, new) in touched.iter().zip(refreshed) {
+            for (&number, new) in self.stale.iter().zip(refreshed) {
                 let block = &mut self.blocks[number as usize];
                 subtract_parts(block, &mut self.marginal, &mut self.sae);
                 *block = new;
                 add_parts(block, &mut self.marginal, &mut self.sae);
             }
         }
+        self.stale.clear();
         self.lane.clear_touched();
     }
 
@@ -183,6 +192,7 @@ fn refresh(lane: &Lane, number: usize, target: &TargetBlock, block: &mut Block, 
     let mut under = [background; PIXELS];
     let mut any_mask = false;
     palette.colors.clear();
+    block.closed_at = u64::MAX;
     for (slot, &key) in (0..).zip(list) {
         let tile = &lane.tiles()[index_of(key) as usize];
         palette.colors.push(tile.color);
@@ -192,7 +202,13 @@ fn refresh(lane: &Lane, number: usize, target: &TargetBlock, block: &mut Block, 
             any_mask = true;
             scan_masked(tile, &lane.scene().masks, slot, background, (x as i32, y as i32), &mut top, &mut under);
         }
+        if slot % LOOK_EVERY == LOOK_EVERY - 1 && under.iter().all(|&under| under != background) {
+            block.closed_at = key;
+            break;
+        }
     }
+    // Of the slots that nobody looked at only the background's is ever asked for.
+    palette.colors.resize(list.len(), 0);
     palette.colors.push(pack(lane.scene().background));
     palette.parts.clear();
     palette.parts.resize(palette.colors.len(), 0);

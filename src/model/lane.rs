@@ -33,8 +33,12 @@ pub struct Lane {
     tiles: Vec<Tile>,
     lists: BlockLists,
     touched: Vec<u32>,
-    is_touched: Vec<bool>,
+    /// Per block the nearest depth key that came or went since the last refresh, or [`UNTOUCHED`].
+    nearest_change: Vec<u64>,
 }
+
+/// No depth key: the block is as it was.
+const UNTOUCHED: u64 = u64::MAX;
 
 impl Lane {
     /// A lane of absent flies, with blocks of `block_side_px`.
@@ -46,7 +50,7 @@ impl Lane {
             flies: vec![Fly::ABSENT; scene.fly_count],
             tiles: vec![Tile::EMPTY; scene.fly_count],
             touched: Vec::new(),
-            is_touched: vec![false; lists.block_count()],
+            nearest_change: vec![UNTOUCHED; lists.block_count()],
             scene,
             canvas,
             lists,
@@ -77,10 +81,17 @@ impl Lane {
         &self.touched
     }
 
+    /// The nearest depth key that came to or went from `block` since it was refreshed. What lies in front of it is as it
+    /// was.
+    #[must_use]
+    pub fn nearest_change(&self, block: usize) -> u64 {
+        self.nearest_change[block]
+    }
+
     /// Forgets which blocks changed: they have been refreshed.
     pub fn clear_touched(&mut self) {
         for block in self.touched.drain(..) {
-            self.is_touched[block as usize] = false;
+            self.nearest_change[block as usize] = UNTOUCHED;
         }
     }
 
@@ -102,14 +113,16 @@ impl Lane {
     pub fn replace(&mut self, index: u32, fly: &Fly) {
         let place = index as usize;
         let tile = Tile::bake(fly, &self.canvas);
-        let (touched, is_touched) = (&mut self.touched, &mut self.is_touched);
-        let mut touch = |block: usize| {
-            if !std::mem::replace(&mut is_touched[block], true) {
+        let (touched, nearest_change) = (&mut self.touched, &mut self.nearest_change);
+        let mut touch = |block: usize, key: u64| {
+            if nearest_change[block] == UNTOUCHED {
                 touched.push(block as u32);
             }
+            nearest_change[block] = nearest_change[block].min(key);
         };
-        self.lists.remove(self.flies[place].depth_key(index), &self.tiles[place], &mut touch);
-        self.lists.insert(fly.depth_key(index), &tile, &mut touch);
+        let (old_key, new_key) = (self.flies[place].depth_key(index), fly.depth_key(index));
+        self.lists.remove(old_key, &self.tiles[place], |block| touch(block, old_key));
+        self.lists.insert(new_key, &tile, |block| touch(block, new_key));
         self.flies[place] = *fly;
         self.tiles[place] = tile;
     }
