@@ -18,9 +18,6 @@ struct FullRefresh {
 }
 
 impl Evaluator for FullRefresh {
-    fn label(&self) -> String {
-        self.inner.label()
-    }
     fn scene(&self, lane: usize) -> &Scene {
         self.inner.scene(lane)
     }

@@ -27,10 +27,6 @@ impl CpuEvaluator {
 }
 
 impl Evaluator for CpuEvaluator {
-    fn label(&self) -> String {
-        "CPU".to_owned()
-    }
-
     fn scene(&self, lane: usize) -> &Scene {
         self.lanes[lane].scene()
     }

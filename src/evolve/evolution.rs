@@ -185,8 +185,7 @@ impl Evolution {
     fn give_birth(&mut self, marginal: &[i64], changes: &mut Vec<Change>) -> bool {
         let run = self.outcome.restarts;
         let mut stream = Stream::new(self.scheme.seed, Purpose::Birth, run, self.births_in_run);
-        let fallback = self.scheme.on_dry == OnDry::Fallback;
-        let index = match self.selection.choose_victim(marginal, fallback, &mut stream) {
+        let index = match self.selection.choose_victim(marginal, self.scheme.on_dry, &mut stream) {
             Victim::Bad(fly) => fly,
             Victim::Fallback(fly) => {
                 self.outcome.fallback_kills += 1;

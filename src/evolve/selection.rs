@@ -1,5 +1,6 @@
 //! Threshold selection: a fly that does not help dies, a fly that helps breeds (paper section 4).
 
+use super::scheme::OnDry;
 use crate::model::rng::Stream;
 
 /// Random flies looked at before the threshold is given up.
@@ -38,7 +39,7 @@ impl Selection {
     }
 
     /// A fly to die that has not been chosen in this generation. At least one must be left.
-    pub fn choose_victim(&mut self, marginal: &[i64], fallback: bool, stream: &mut Stream) -> Victim {
+    pub fn choose_victim(&mut self, marginal: &[i64], on_dry: OnDry, stream: &mut Stream) -> Victim {
         let fly_count = marginal.len() as u32;
         for _ in 0..TRIES {
             let fly = stream.below(fly_count);
@@ -47,7 +48,7 @@ impl Selection {
                 return Victim::Bad(fly);
             }
         }
-        if !fallback {
+        if on_dry != OnDry::Fallback {
             return Victim::Dry;
         }
         let (one, other) = (self.random_free(fly_count, stream), self.random_free(fly_count, stream));
@@ -100,7 +101,7 @@ mod tests {
         let mut selection = Selection::new(marginal.len());
         for _ in 0..200 {
             selection.begin_generation();
-            match selection.choose_victim(&marginal, true, &mut stream) {
+            match selection.choose_victim(&marginal, OnDry::Fallback, &mut stream) {
                 Victim::Bad(fly) => assert!(marginal[fly as usize] <= 0),
                 other => panic!("60 of 100 flies are bad, yet {other:?}"),
             }
@@ -114,7 +115,7 @@ mod tests {
         let mut selection = Selection::new(marginal.len());
         let mut stream = stream();
         let mut dead: Vec<u32> = (0..6)
-            .map(|_| match selection.choose_victim(&marginal, true, &mut stream) {
+            .map(|_| match selection.choose_victim(&marginal, OnDry::Fallback, &mut stream) {
                 Victim::Bad(fly) | Victim::Fallback(fly) => fly,
                 Victim::Dry => panic!("the fallback always finds one"),
             })
@@ -127,8 +128,8 @@ mod tests {
     fn a_dry_population_is_reported_or_falls_back_to_the_lower_of_two() {
         let marginal: Vec<i64> = (1..=50).collect();
         let mut stream = stream();
-        assert_eq!(Selection::new(50).choose_victim(&marginal, false, &mut stream), Victim::Dry);
-        let fallback = |_| match Selection::new(50).choose_victim(&marginal, true, &mut stream) {
+        assert_eq!(Selection::new(50).choose_victim(&marginal, OnDry::Stop, &mut stream), Victim::Dry);
+        let fallback = |_| match Selection::new(50).choose_victim(&marginal, OnDry::Fallback, &mut stream) {
             Victim::Fallback(fly) => u64::from(fly),
             other => panic!("{other:?} without a bad fly"),
         };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::layout::{EvaluatePush, INSIDE, LaneRecord, Tile, WorkItem};
+use super::layout::{EvaluatePush, LaneRecord, Tile, WorkItem};
 use super::shaders;
 use crate::error::{Error, Result};
 use crate::model::mask::MASK_SIDE;
@@ -135,27 +135,10 @@ impl EvaluatePass {
                 "{pixel_count} pixels are more than one Vulkan device evaluates at once; use a smaller --size, or --device cpu"
             )));
         }
-        let block_count = pixel_count / shape.block_pixels();
-        // Room for the lists of a whole population of ordinary depth; longer work takes several submissions.
-        let entry_count = (16 * fly_count + 8 * block_count).clamp(1 << 16, 1 << 22);
-        let storage = |name: &str, bytes: usize| {
-            Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
-        };
+        let buffers = create_buffers(device, lanes.len(), fly_count, pixel_count, shape)?;
         let masks = create_masks(device, recorder, lanes.iter().map(|lane| &*lane.scene().masks))?;
         let variant = Variant::for_lanes(lanes, shape);
         let pipeline = create_pipeline(device, variant)?;
-        let buffers = [
-            storage("lanes", lanes.len() * size_of::<LaneRecord>())?,
-            storage("work", block_count * size_of::<WorkItem>())?,
-            storage("entries", entry_count * 4)?,
-            storage("tiles", fly_count * size_of::<Tile>())?,
-            storage("targets", pixel_count * 4)?,
-            storage("top layer", pixel_count * 4)?,
-            storage("under layer", pixel_count * 4)?,
-            storage("parts", pixel_count * 4)?,
-            storage("marginal fitness", fly_count * 8)?,
-            storage("sums", lanes.len() * 8)?,
-        ];
         let group = bind(&pipeline, &buffers, &masks)?;
         let [lane_records, work, entries, tiles, targets, top, under, parts, marginal, sums] = buffers;
         upload_lanes(recorder, &lane_records, lanes, &spans)?;
@@ -163,7 +146,7 @@ impl EvaluatePass {
             recorder.write_buffer(
                 &targets,
                 span.first_pixel as u64 * 4,
-                bytemuck::cast_slice(&blocked(lane, shape)),
+                bytemuck::cast_slice(&lane.blocked_target()),
             )?;
         }
         Ok(Self {
@@ -232,6 +215,33 @@ impl EvaluatePass {
     }
 }
 
+/// The storage buffers, in the order of their bindings.
+fn create_buffers(
+    device: &Arc<Device>,
+    lane_count: usize,
+    fly_count: usize,
+    pixel_count: usize,
+    shape: KernelShape,
+) -> Result<[Arc<Buffer>; 10]> {
+    let block_count = pixel_count / shape.block_pixels();
+    // Room for the lists of a whole population of ordinary depth; longer work takes several submissions.
+    let entry_count = (16 * fly_count + 8 * block_count).clamp(1 << 16, 1 << 22);
+    let storage =
+        |name: &str, bytes: usize| Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device);
+    Ok([
+        storage("lanes", lane_count * size_of::<LaneRecord>())?,
+        storage("work", block_count * size_of::<WorkItem>())?,
+        storage("entries", entry_count * 4)?,
+        storage("tiles", fly_count * size_of::<Tile>())?,
+        storage("targets", pixel_count * 4)?,
+        storage("top layer", pixel_count * 4)?,
+        storage("under layer", pixel_count * 4)?,
+        storage("parts", pixel_count * 4)?,
+        storage("marginal fitness", fly_count * 8)?,
+        storage("sums", lane_count * 8)?,
+    ])
+}
+
 /// The kernel in one of its variants.
 pub(super) fn create_pipeline(device: &Arc<Device>, variant: Variant) -> Result<Arc<ComputePipeline>> {
     let mut bindings = [BindingKind::StorageBuffer; 11];
@@ -292,20 +302,4 @@ fn upload_lanes(recorder: &mut Recorder, buffer: &Arc<Buffer>, lanes: &[Lane], s
     };
     let records: Vec<LaneRecord> = (0..).zip(lanes.iter().zip(spans)).map(record).collect();
     recorder.write_buffer(buffer, 0, bytemuck::cast_slice(&records))
-}
-
-/// The lane's target block by block, packed, with [`INSIDE`]; pixels beyond the picture's edge are 0.
-fn blocked(lane: &Lane, shape: KernelShape) -> Vec<u32> {
-    let (target, lists) = (&lane.scene().target, lane.lists());
-    let (width, height, side) = (target.width_px(), target.height_px(), shape.block_side_px);
-    let mut words = vec![0; lists.block_count() * shape.block_pixels()];
-    for (number, block) in words.chunks_exact_mut(shape.block_pixels()).enumerate() {
-        let (x, y) = lists.origin(number);
-        for (row, places) in (y..height).zip(block.chunks_exact_mut(side as usize)) {
-            let first = row as usize * width as usize + x as usize;
-            let pixels = &target.pixels()[first..][..side.min(width - x) as usize];
-            places.iter_mut().zip(pixels).for_each(|(place, &color)| *place = pack(color) | INSIDE);
-        }
-    }
-    words
 }

@@ -79,20 +79,21 @@ impl GpuEvaluator {
     /// # Errors
     /// If the device fails.
     pub fn evaluate_again(&mut self) -> Result<()> {
-        for lane in 0..self.lanes.len() {
-            self.restart_sums(lane)?;
-        }
-        self.run(&(0..self.lanes.len()).collect::<Vec<_>>(), FLAG_FRESH)
+        self.evaluate_all(&(0..self.lanes.len()).collect::<Vec<_>>())
     }
 
-    /// Zeroes the sums of a lane and marks all its blocks as stale.
-    fn restart_sums(&mut self, lane: usize) -> Result<()> {
-        let (offset, bytes) = marginal_range(&self.pass.spans[lane]);
-        self.recorder.write_buffer(&self.pass.marginal, offset, &vec![0; bytes as usize])?;
-        self.recorder.write_buffer(&self.pass.sums, lane as u64 * 8, &[0; 8])?;
-        let blocks = 0..self.lanes[lane].lists().block_count() as u32;
-        self.work.pending.extend(blocks.map(|block| Pending { lane, block, from: 0 }));
-        Ok(())
+    /// Evaluates all blocks of `lanes` afresh.
+    fn evaluate_all(&mut self, lanes: &[usize]) -> Result<()> {
+        let mut zeroes = self.recorder.transfer_pass("zero sums")?;
+        for &lane in lanes {
+            let (offset, bytes) = marginal_range(&self.pass.spans[lane]);
+            zeroes.fill(&self.pass.marginal, offset, bytes, 0);
+            zeroes.fill(&self.pass.sums, lane as u64 * 8, 8, 0);
+            let blocks = 0..self.lanes[lane].lists().block_count() as u32;
+            self.work.pending.extend(blocks.map(|block| Pending { lane, block, from: 0 }));
+        }
+        drop(zeroes);
+        self.run(lanes, FLAG_FRESH)
     }
 
     /// Evaluates all pending blocks and reads the fitness of `lanes` back.
@@ -209,10 +210,6 @@ fn marginal_range(span: &LaneSpan) -> (u64, u64) {
 }
 
 impl Evaluator for GpuEvaluator {
-    fn label(&self) -> String {
-        self.device.info().name.clone()
-    }
-
     fn scene(&self, lane: usize) -> &Scene {
         self.lanes[lane].scene()
     }
@@ -228,10 +225,8 @@ impl Evaluator for GpuEvaluator {
             let tile_bytes = size_of::<Tile>() as u64;
             let first_byte = span.first_fly as u64 * tile_bytes;
             self.recorder.write_buffer(&self.pass.tiles, first_byte, bytemuck::cast_slice(lane.tiles()))?;
-            self.restart_sums(number)?;
         }
-        let lanes: Vec<usize> = populations.iter().map(|&(lane, _)| lane).collect();
-        self.run(&lanes, FLAG_FRESH)
+        self.evaluate_all(&populations.iter().map(|&(lane, _)| lane).collect::<Vec<_>>())
     }
 
     fn replace(&mut self, changes: &[Change]) -> Result<()> {

@@ -47,9 +47,6 @@ pub const FLAG_CONTINUED: u32 = 2;
 /// A later dispatch looks at the rest of the list.
 pub const FLAG_UNFINISHED: u32 = 4;
 
-/// Highest byte of a target pixel inside the picture.
-pub const INSIDE: u32 = 0xFF00_0000;
-
 /// `Push` of `glsl/evaluate.comp`.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]

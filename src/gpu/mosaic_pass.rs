@@ -9,7 +9,7 @@ use super::evaluate_pass::create_masks;
 use super::layout::{Instance, MosaicPush, Tile};
 use super::shaders;
 use crate::error::Result;
-use crate::model::blocks::{BlockLists, index_of};
+use crate::model::blocks::{BlockLists, depth_order, index_of};
 use crate::model::{Canvas, Fly, Mosaic, NO_FLY, Patch, Population};
 use crate::vk::{
     Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, DepthTest, Device,
@@ -177,10 +177,8 @@ fn quad_transform(tile: &Tile) -> DAffine2 {
 
 /// Per fly its place in the depth order.
 fn ranks(population: &Population) -> Vec<u32> {
-    let mut keys: Vec<u64> = (0..).zip(&population.flies).map(|(index, fly)| fly.depth_key(index)).collect();
-    keys.sort_unstable();
-    let mut ranks = vec![0; keys.len()];
-    for (rank, key) in (0..).zip(keys) {
+    let mut ranks = vec![0; population.flies.len()];
+    for (rank, key) in (0..).zip(depth_order(&population.flies)) {
         ranks[index_of(key) as usize] = rank;
     }
     ranks

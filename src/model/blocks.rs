@@ -22,6 +22,14 @@ pub fn index_of(depth_key: u64) -> u32 {
     depth_key as u32
 }
 
+/// The depth keys of all flies, nearest first.
+#[must_use]
+pub fn depth_order(flies: &[Fly]) -> Vec<u64> {
+    let mut keys: Vec<u64> = (0..).zip(flies).map(|(index, fly)| fly.depth_key(index)).collect();
+    keys.sort_unstable();
+    keys
+}
+
 impl BlockLists {
     /// Empty lists for the blocks of `side_px` x `side_px` px that cover `canvas`; blocks at the right and lower edges
     /// may hang over.
@@ -29,6 +37,12 @@ impl BlockLists {
     pub fn new(canvas: &Canvas, side_px: u32) -> Self {
         let (columns, rows) = (canvas.width_px.div_ceil(side_px), canvas.height_px.div_ceil(side_px));
         Self { side_px, columns, lists: vec![Vec::new(); columns as usize * rows as usize] }
+    }
+
+    /// Pixels along each side of a block.
+    #[must_use]
+    pub fn side_px(&self) -> u32 {
+        self.side_px
     }
 
     /// Blocks along the width.
@@ -61,9 +75,7 @@ impl BlockLists {
     /// Lists of a whole population, replacing what was there.
     pub fn fill(&mut self, flies: &[Fly], tiles: &[Tile]) {
         self.lists.iter_mut().for_each(Vec::clear);
-        let mut keys: Vec<u64> = (0..).zip(flies).map(|(index, fly)| fly.depth_key(index)).collect();
-        keys.sort_unstable();
-        for key in keys {
+        for key in depth_order(flies) {
             for block in self.blocks_of(&tiles[index_of(key) as usize]) {
                 self.lists[block].push(key);
             }

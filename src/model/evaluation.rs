@@ -43,10 +43,7 @@ pub struct Layers {
 ///
 /// Every implementation gives the same numbers and the same pixels.
 pub trait Evaluator: Send {
-    /// What evaluates, for people: a device's name, or the CPU.
-    fn label(&self) -> String;
-
-    /// The scenes of all lanes, in order.
+    /// What stays the same while `lane` evolves.
     fn scene(&self, lane: usize) -> &Scene;
 
     /// Number of lanes.

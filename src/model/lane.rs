@@ -9,7 +9,7 @@ use super::blocks::BlockLists;
 use super::fly::Fly;
 use super::mask::MaskSet;
 use super::target::{Rgb, Target};
-use super::tile::{Canvas, Tile};
+use super::tile::{Canvas, Tile, pack};
 
 /// What stays the same while a lane evolves.
 #[derive(Clone, Debug)]
@@ -37,6 +37,9 @@ pub struct Lane {
     nearest_change: Vec<u64>,
 }
 
+/// Highest byte of a target pixel inside the picture, in [`Lane::blocked_target`].
+pub const INSIDE: u32 = 0xFF00_0000;
+
 /// No depth key: the block is as it was.
 const UNTOUCHED: u64 = u64::MAX;
 
@@ -61,6 +64,24 @@ impl Lane {
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// The target's pixels block by block, rows within blocks, packed with [`INSIDE`]; the overhang of blocks at the
+    /// edges is 0.
+    #[must_use]
+    pub fn blocked_target(&self) -> Vec<u32> {
+        let target = &self.scene.target;
+        let (width, height, side) = (target.width_px(), target.height_px(), self.lists.side_px());
+        let mut words = vec![0; self.lists.block_count() * (side * side) as usize];
+        for (number, block) in words.chunks_exact_mut((side * side) as usize).enumerate() {
+            let (x, y) = self.lists.origin(number);
+            for (row, places) in (y..height).zip(block.chunks_exact_mut(side as usize)) {
+                let first = row as usize * width as usize + x as usize;
+                let pixels = &target.pixels()[first..][..side.min(width - x) as usize];
+                places.iter_mut().zip(pixels).for_each(|(place, &color)| *place = pack(color) | INSIDE);
+            }
+        }
+        words
     }
 
     /// The baked flies, by index.

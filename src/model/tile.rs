@@ -214,3 +214,91 @@ fn clip(centre: i64, half: i64, unit: i64, side_px: u32) -> (i64, i64) {
     let last = (centre + half).div_euclid(unit).min(i64::from(side_px) - 1);
     (first, last)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::rng::{Purpose, Stream};
+
+    fn covered(tile: &Tile, i: i32, j: i32) -> bool {
+        let (u, v) = tile.coordinates(i, j);
+        u < tile.u_end() && v < tile.v_end()
+    }
+
+    fn covered_pixels(fly: &Fly, canvas: &Canvas) -> usize {
+        let tile = Tile::bake(fly, canvas);
+        let inside = |(i, j): &(i32, i32)| (tile.x0..=tile.x1).contains(i) && (tile.y0..=tile.y1).contains(j);
+        let pixels = (0..canvas.height_px as i32).flat_map(|j| (0..canvas.width_px as i32).map(move |i| (i, j)));
+        pixels.filter(inside).filter(|&(i, j)| covered(&tile, i, j)).count()
+    }
+
+    #[test]
+    fn a_square_of_whole_pixels_covers_its_area_at_every_scale() {
+        // Centre at pixel corner (9, 6) - 1/2: twelve by six pixels, from 3 to 14 and from 3 to 8.
+        let fly = Fly { x: 64 * 9 - 32, y: 64 * 6 - 32, w: 64 * 12, h: 64 * 6, alive: true, ..Fly::ABSENT };
+        for (long_side_px, area) in [(8, 8), (24, 72), (48, 288), (192, 72 * 64)] {
+            assert_eq!(covered_pixels(&fly, &Canvas::scaled(24, 12, long_side_px)), area, "at {long_side_px} px");
+        }
+        assert_eq!(covered_pixels(&fly, &Canvas::evaluation(24, 12)), 72);
+    }
+
+    #[test]
+    fn at_any_scale_all_numbers_fit_and_no_covered_pixel_lies_outside_the_box() {
+        let mut stream = Stream::new(1, Purpose::FirstPopulation, 9, 9);
+        for round in 0..20_000_u32 {
+            let (width_px, height_px) = (1 + stream.below(600), 1 + stream.below(600));
+            let long_side_px = if round % 2 == 0 { width_px.max(height_px) } else { 1 + stream.below(60_000) };
+            let canvas = Canvas::scaled(width_px, height_px, long_side_px);
+            let mut side = || (16 << stream.below(15)).min(SIDE_MAX) - stream.below(16).min(1);
+            let (w, h) = (side().max(16), side().max(16));
+            let fly = Fly {
+                x: stream.below((width_px - 1) * 64 + 1) as i32,
+                y: stream.below((height_px - 1) * 64 + 1) as i32,
+                angle: stream.bits() as u16,
+                w,
+                h,
+                alive: true,
+                ..Fly::ABSENT
+            };
+            check_against_wide_integers(&fly, &canvas, &mut stream);
+        }
+    }
+
+    /// The tile's map and box against the same rule in 128 bits, without a box, at random pixels and around the box.
+    fn check_against_wide_integers(fly: &Fly, canvas: &Canvas, stream: &mut Stream) {
+        let tile = Tile::bake(fly, canvas);
+        let mut pixels: Vec<(i32, i32)> =
+            (0..8).map(|_| (stream.below(canvas.width_px) as i32, stream.below(canvas.height_px) as i32)).collect();
+        for (i, j) in [(tile.x0, tile.y0), (tile.x1, tile.y1), (tile.x0, tile.y1), (tile.x1, tile.y0)] {
+            pixels.extend([(i, j), (i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)]);
+        }
+        pixels.push(((tile.x0 + tile.x1) / 2, (tile.y0 + tile.y1) / 2));
+        let on_canvas = |&(i, j): &(i32, i32)| {
+            (0..canvas.width_px as i32).contains(&i) && (0..canvas.height_px as i32).contains(&j)
+        };
+        for (i, j) in pixels.into_iter().filter(on_canvas) {
+            let in_box = (tile.x0..=tile.x1).contains(&i) && (tile.y0..=tile.y1).contains(&j);
+            let found = in_box && covered(&tile, i, j);
+            assert_eq!(found, covered_in_wide_integers(fly, canvas, i, j), "{fly:?} on {canvas:?} at {i}, {j}");
+        }
+    }
+
+    fn covered_in_wide_integers(fly: &Fly, canvas: &Canvas, i: i32, j: i32) -> bool {
+        let (numerator, denominator) = (i128::from(canvas.scale.0), i128::from(canvas.scale.1));
+        let rounded = |value: i128, divisor: i128| (2 * value + divisor).div_euclid(2 * divisor);
+        let largest = i128::from(SIDE_MAX);
+        let longest = i128::from(fly.w.max(fly.h)) * numerator;
+        let units_per_px =
+            [64, 32, 16, 8, 4, 2].into_iter().find(|units| rounded(longest * units, denominator * 64) <= largest);
+        let units_per_px = units_per_px.unwrap_or(1);
+        let divisor = denominator * 64;
+        let place = |x: i32| rounded(((i128::from(x) + 32) * numerator - 32 * denominator) * units_per_px, divisor);
+        let side = |w: u32| rounded(i128::from(w) * numerator * units_per_px, divisor).clamp(1, largest);
+        let (cos, sin) = cos_sin(fly.angle);
+        let (dx, dy) = (i128::from(i) * units_per_px - place(fly.x), i128::from(j) * units_per_px - place(fly.y));
+        let u = dx * i128::from(cos) + dy * i128::from(sin);
+        let v = dy * i128::from(cos) - dx * i128::from(sin);
+        let (half_w, half_h) = (side(fly.w) * 2048, side(fly.h) * 2048);
+        (-half_w..half_w).contains(&u) && (-half_h..half_h).contains(&v)
+    }
+}

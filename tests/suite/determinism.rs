@@ -1,9 +1,10 @@
 //! Same picture, options and seed: the same population and the same pixels, whatever evaluates and however.
 
+use sha2::{Digest, Sha256};
 use smalti::cpu::CpuEvaluator;
 use smalti::engine::{Engine, Undisturbed};
 use smalti::evolve::evolution::random_population;
-use smalti::evolve::{Evolution, Outcome, PaperScheme};
+use smalti::evolve::{ALGORITHM_VERSION, Evolution, Outcome, PaperScheme};
 use smalti::gpu::GpuEvaluator;
 use smalti::model::{Canvas, Evaluator, Fly, Mosaic, Population, Scene};
 use smalti::vk::DeviceOptions;
@@ -33,13 +34,14 @@ fn evolve(evaluator: Box<dyn Evaluator>, scheme: PaperScheme) -> Result {
     let evaluation = engine.evaluator().evaluation(0);
     assert_eq!(evaluation.sae, sae, "the best population is loaded when the evolution has ended");
     let marginal = evaluation.marginal.to_vec();
-    let canvas = Canvas::scaled(width_px, height_px, 150);
+    let canvas = Canvas::scaled(width_px, height_px, 450);
     let mosaic = engine.evaluator().draw(&population, &canvas, 2).expect("the evaluator works");
     (best, sae, marginal, outcome, mosaic)
 }
 
+/// Large enough that the twin shares both a whole evaluation and a batch of births among its threads.
 fn scene() -> Scene {
-    random_scene(60, 44, 150, &mut stream(8))
+    random_scene(320, 240, 900, &mut stream(8))
 }
 
 fn on_threads(threads: usize, scheme: &PaperScheme) -> Result {
@@ -70,7 +72,7 @@ fn batches_of_births_with_cooling_restarts_lead_to_the_same_mosaic_everywhere() 
         births: 2_000,
         restarts: 2,
         cool_q16: 1 << 15,
-        batch_births: 7,
+        batch_births: 90,
         ..PaperScheme::default()
     };
     check_everywhere(&scheme);
@@ -83,4 +85,27 @@ fn evolution_lowers_the_error_and_restarts_never_lose_the_best() {
     let saes = [first, run(0), run(1), run(2)];
     assert!(saes[1] < first, "{saes:?}");
     assert!(saes.is_sorted_by(|a, b| a >= b), "{saes:?}");
+}
+
+/// The first 16 digits of the SHA-256 of the best population, gene by gene.
+fn population_hash((flies, ..): &Result) -> String {
+    let mut hash = Sha256::new();
+    for fly in flies {
+        let genes = [fly.x as u32, fly.y as u32, fly.z, fly.w, fly.h, fly.angle.into()];
+        let colors = [fly.r, fly.g, fly.b].map(u32::from);
+        genes.iter().chain(&colors).for_each(|gene| hash.update(gene.to_le_bytes()));
+    }
+    hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[test]
+fn this_version_of_the_algorithm_leads_to_the_populations_it_always_did() {
+    let one_by_one = PaperScheme { seed: 5, births: 3_000, ..PaperScheme::default() };
+    let batches = PaperScheme { restarts: 1, cool_q16: 40_000, batch_births: 11, ..one_by_one.clone() };
+    let found = [&one_by_one, &batches].map(|scheme| population_hash(&on_threads(2, scheme)));
+    assert_eq!(
+        (ALGORITHM_VERSION, found.each_ref().map(String::as_str)),
+        (1, ["20dfb2177a56e5a2", "f9995ec40bbcf711"]),
+        "the same options give another population: raise evolve::ALGORITHM_VERSION with the hashes"
+    );
 }

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use smalti::cpu::CpuEvaluator;
 use smalti::gpu::{GpuEvaluator, KernelShape};
-use smalti::model::{Canvas, Change, Evaluator, Fly, NO_FLY, Population, Scene};
+use smalti::model::fly::SIDE_MAX;
+use smalti::model::{Canvas, Change, Evaluator, Fly, NO_FLY, Population, Scene, Target};
 
 use smalti::vk::{DeviceOptions, Staging};
 
@@ -177,5 +178,46 @@ fn re_rendering_without_each_fly_gives_the_marginal_fitness_of_the_one_dispatch(
         evaluator.load(&[(0, &flies)]).expect("the evaluator works");
         let slow = evaluator.marginal_by_re_rendering().expect("it fits a dispatch");
         assert_eq!(slow, evaluator.evaluation(0).marginal);
+    });
+}
+
+/// White over black on 2400x2400 px: marginal fitness and SAE need more than 32 bits, going up and coming down.
+fn check_wide_sums(mut create: impl FnMut(Scene) -> Box<dyn Evaluator>) {
+    const SIDE_PX: u32 = 2_400;
+    let pixels = i64::from(SIDE_PX * SIDE_PX);
+    let black = Target::new(SIDE_PX, SIDE_PX, vec![[0; 3]; pixels as usize]).expect("a valid size");
+    let scene = Scene { target: Arc::new(black), masks: Arc::default(), background: [0; 3], fly_count: 2 };
+    let whole = Fly { x: 76_800, y: 76_800, w: SIDE_MAX, h: SIDE_MAX, alive: true, ..Fly::ABSENT };
+    let white = Fly { r: 65_535, g: 65_535, b: 65_535, z: 1, ..whole };
+    let grey = Fly { r: 32_896, g: 32_896, b: 32_896, z: 2, ..whole };
+    let mut evaluator = create(scene);
+    evaluator.load(&[(0, &[white, grey])]).expect("the evaluator works");
+    let per_pixel = |expected: (i64, i64, i64), evaluator: &dyn Evaluator| {
+        let (sae, first, second) = expected;
+        let evaluation = evaluator.evaluation(0);
+        assert_eq!(evaluation.sae as i64, sae * pixels);
+        assert_eq!(evaluation.marginal, [first * pixels, second * pixels]);
+    };
+    // 128 of 255 in each of three channels is 384; white is 765.
+    per_pixel((765, 384 - 765, 0), &*evaluator);
+    let mut replace = |index, fly| evaluator.replace(&[Change { lane: 0, index, fly }]).expect("the evaluator works");
+    replace(0, Fly::ABSENT);
+    replace(1, white);
+    per_pixel((765, 0, -765), &*evaluator);
+    evaluator.replace(&[Change { lane: 0, index: 1, fly: Fly::ABSENT }]).expect("the evaluator works");
+    per_pixel((0, 0, 0), &*evaluator);
+    evaluator.replace(&[Change { lane: 0, index: 0, fly: white }]).expect("the evaluator works");
+    per_pixel((765, -765, 0), &*evaluator);
+}
+
+#[test]
+fn on_the_cpu_sums_past_32_bits_survive_replacements() {
+    check_wide_sums(|scene| Box::new(CpuEvaluator::new(vec![scene])));
+}
+
+#[test]
+fn on_vulkan_sums_past_32_bits_survive_replacements() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_wide_sums(|scene| Box::new(GpuEvaluator::create(&device, vec![scene]).expect("it fits")));
     });
 }
