@@ -266,7 +266,8 @@ impl Scan {
     /// Adds a tile without holes; there are no branches, so a row of 8 pixels is one vector.
     #[inline(always)]
     fn add_square(&mut self, tile: &Tile, slot: u32) {
-        let (x, y) = self.origin;
+        // A local, since the compiler cannot see that the rows never overlap the field.
+        let (none, (x, y)) = (self.background, self.origin);
         let (first, last) = ((tile.y0 - y).max(0), (tile.y1 - y).min(SIDE as i32 - 1));
         let (u_end, v_end) = (tile.u_end(), tile.v_end());
         let (mut u, mut v) = tile.coordinates(x, y + first);
@@ -277,7 +278,7 @@ impl Scan {
             let (top, under) = (&mut self.top[start..start + SIDE], &mut self.under[start..start + SIDE]);
             for i in 0..SIDE {
                 let covered = (u.wrapping_add(u_steps[i]) < u_end) & (v.wrapping_sub(v_steps[i]) < v_end);
-                let candidate = if covered { slot } else { self.background };
+                let candidate = if covered { slot } else { none };
                 under[i] = under[i].min(top[i].max(candidate));
                 top[i] = top[i].min(candidate);
             }
