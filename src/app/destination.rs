@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use super::options::Overwrite;
-use super::provenance;
+use super::provenance::{self, Ending};
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -98,13 +98,22 @@ pub(super) fn check_replaceable(destination: &Destination, key: &str, overwrite:
     if overwrite == Overwrite::Force || destination.is_stdout() || !destination.path.is_file() {
         return Ok(());
     }
-    let why = match provenance::key_of_file(destination) {
-        Some(found) if found == key => return Ok(()),
+    let why = match provenance::story_of_file(destination) {
+        Some(found) if found.key == key => return Ok(()),
         Some(_) => "made with other options",
         None => "not made by smalti",
     };
     let path = destination.path.display();
     Err(Error::Usage(format!("{path} exists and was {why}; name another file, or replace it with --force")))
+}
+
+/// Whether the file that is there holds a better result of the same command, which must not be lost: a run may end
+/// earlier than the one before it, by Ctrl-C or by the clock.
+pub(super) fn should_keep(destination: &Destination, key: &str, ending: &Ending, overwrite: Overwrite) -> bool {
+    if overwrite == Overwrite::Force || destination.is_stdout() || !destination.path.is_file() {
+        return false;
+    }
+    provenance::story_of_file(destination).is_some_and(|found| found.key == key && found.is_better_than(ending))
 }
 
 /// One name for one file, however it was written.

@@ -132,14 +132,40 @@ impl Provenance {
     }
 }
 
-/// The key in the file at a destination, if smalti wrote it.
-pub(super) fn key_of_file(destination: &Destination) -> Option<String> {
+/// What a file tells about the result in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Story {
+    pub key: String,
+    /// Whether its evolution came to its end.
+    pub is_complete: bool,
+    /// None for a fitted picture.
+    pub sae: Option<u64>,
+}
+
+impl Story {
+    /// Whether the file should stay rather than make room for a result with the same key that ended like `ending`.
+    ///
+    /// Both are cut from one course of births, so the lower SAE is the one that got farther.
+    pub(super) fn is_better_than(&self, ending: &Ending) -> bool {
+        let new_is_complete = ending.status == Status::Complete;
+        if self.is_complete != new_is_complete {
+            return self.is_complete;
+        }
+        self.sae.is_some_and(|sae| sae < ending.sae)
+    }
+}
+
+/// The story of the file at a destination, if smalti wrote it.
+pub(super) fn story_of_file(destination: &Destination) -> Option<Story> {
     let told = match destination.content {
         Content::Population => archive::read_meta(&destination.path).ok()?,
         Content::Png | Content::Jpeg => picture_description(photo::read_metadata(&destination.path)).ok()??,
     };
-    let is_ours = told.get("software").and_then(Value::as_str) == Some(SOFTWARE);
-    told.get("key").and_then(Value::as_str).filter(|_| is_ours).map(str::to_owned)
+    let text = |key| told.get(key).and_then(Value::as_str);
+    let key = text("key").filter(|_| text("software") == Some(SOFTWARE))?.to_owned();
+    // An unknown word is a result that somebody may want to keep.
+    let is_complete = text("status") != Some("partial");
+    Some(Story { key, is_complete, sae: told.get("sae").and_then(Value::as_u64) })
 }
 
 fn picture_description(metadata: Result<Metadata>) -> Result<Option<Map<String, Value>>> {
@@ -172,4 +198,26 @@ fn population_sha256(population: &Population) -> String {
 
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_results_of_one_command_the_complete_one_is_better_and_then_the_lower_sae() {
+        let ending = |status, sae| Ending { status, stop: StopReason::Time, sae, outcome: Outcome::default() };
+        let story = |is_complete, sae| Story { key: String::new(), is_complete, sae: Some(sae) };
+        for (is_complete, old_sae, status, new_sae, stays) in [
+            (true, 9, Status::Partial, 8, true),
+            (false, 8, Status::Complete, 9, false),
+            (true, 8, Status::Complete, 9, true),
+            (true, 9, Status::Complete, 8, false),
+            (true, 9, Status::Complete, 9, false),
+            (false, 8, Status::Partial, 9, true),
+        ] {
+            let is_better = story(is_complete, old_sae).is_better_than(&ending(status, new_sae));
+            assert_eq!(is_better, stays, "{is_complete} {old_sae}, then {status:?} {new_sae}");
+        }
+    }
 }

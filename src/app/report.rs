@@ -174,7 +174,8 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
         say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
     }
     let partial = if row.status == Status::Partial { " (partial: run the same command again)" } else { "" };
-    say(&format!("wrote {}{partial}", row.output.join(", ")));
+    let written = if row.output.is_empty() { "nothing".to_owned() } else { row.output.join(", ") };
+    say(&format!("wrote {written}{partial}"));
 }
 
 /// What a dry run says.

@@ -79,7 +79,7 @@ fn supersampling(long_side_px: u32) -> u32 {
 
 /// The outputs as bytes; nothing is written before all of them are there.
 pub(super) fn encode<'a>(
-    options: &'a EvolveOptions,
+    outputs: &[&'a Destination],
     evolved: Evolved,
     provenance: &Provenance,
 ) -> Result<Vec<EncodedFile<'a>>> {
@@ -97,7 +97,7 @@ pub(super) fn encode<'a>(
         }?;
         Ok(EncodedFile { destination, bytes })
     };
-    options.outputs.iter().map(encode_one).collect()
+    outputs.iter().copied().map(encode_one).collect()
 }
 
 /// The file of `--save-target`, if it was asked for.

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use super::cli::EvolveArgs;
+use super::destination::Destination;
 use super::device::{self, Opened, Selected};
 use super::interrupt::Interrupt;
 use super::job::Job;
@@ -65,7 +66,10 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let evolved = evolve_job(options, &job, selected, &interrupt, row)?;
     let began = Instant::now();
     let status = evolved.ending.status;
-    let mut files = result::encode(options, evolved, &provenance)?;
+    let outputs = outputs_to_write(options, &provenance, &evolved.ending);
+    row.output = outputs.iter().map(|output| output.path.display().to_string()).collect();
+    row.output.extend(options.save_target.iter().map(|output| output.path.display().to_string()));
+    let mut files = result::encode(&outputs, evolved, &provenance)?;
     files.extend(result::encode_target(options, &job, &target_provenance)?);
     interrupt.while_writing(|| result::write(&files))?;
     row.save_ms = report::milliseconds(began.elapsed());
@@ -109,6 +113,20 @@ fn check_replaceable(options: &EvolveOptions, mosaic: &Provenance, target: &Prov
     let outputs = options.outputs.iter().map(|output| (output, mosaic.key()));
     let targets = options.save_target.iter().map(|output| (output, target.key()));
     outputs.chain(targets).try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))
+}
+
+/// The outputs without those that hold a better result of the same command.
+fn outputs_to_write<'a>(options: &'a EvolveOptions, provenance: &Provenance, ending: &Ending) -> Vec<&'a Destination> {
+    let key = provenance.key();
+    let (kept, outputs): (Vec<_>, Vec<_>) =
+        options.outputs.iter().partition(|output| destination::should_keep(output, key, ending, options.overwrite));
+    if options.verbosity > Verbosity::Quiet {
+        for output in kept {
+            let path = output.path.display();
+            report::say(&format!("smalti: {path} is kept: the same command got farther when it wrote it"));
+        }
+    }
+    outputs
 }
 
 /// Says what somebody should know before the work begins.
