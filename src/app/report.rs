@@ -24,7 +24,7 @@ pub(super) enum Status {
     Partial,
     /// Not evolved: only a dry run.
     Planned,
-    /// Nothing was written.
+    /// Not all outputs were written.
     Failed,
 }
 
@@ -108,10 +108,9 @@ impl Row {
         self.restarts = outcome.restarts;
     }
 
-    /// Takes in why there is no result.
+    /// Takes in why there is no result, or not all of it.
     pub(super) fn note_failure(&mut self, error: &Error) {
         self.status = Status::Failed;
-        self.output.clear();
         self.error = Some(error.to_string());
     }
 

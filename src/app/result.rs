@@ -113,15 +113,24 @@ pub(super) fn encode_target<'a>(
     Ok(Some(EncodedFile { destination, bytes }))
 }
 
-/// Writes the files one after the other, each in one step.
-pub(super) fn write(files: &[EncodedFile<'_>]) -> Result<()> {
-    files.iter().try_for_each(|EncodedFile { destination, bytes }| {
-        if destination.is_stdout() {
+/// Writes the files one after the other, each in one step, and adds to `written` those that are there now.
+///
+/// # Errors
+/// The first failure; the files after it are written nevertheless, since hours of work may be in them.
+pub(super) fn write(files: &[EncodedFile<'_>], written: &mut Vec<String>) -> Result<()> {
+    let mut outcome = Ok(());
+    for EncodedFile { destination, bytes } in files {
+        let one = if destination.is_stdout() {
             report::write_stdout(bytes)
         } else {
             output::write_atomically(&destination.path, bytes)
+        };
+        if one.is_ok() {
+            written.push(destination.path.display().to_string());
         }
-    })
+        outcome = outcome.and(one);
+    }
+    outcome
 }
 
 #[cfg(test)]

@@ -54,11 +54,11 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let provenance = Provenance::of_mosaic(options, &job);
     let target_provenance = Provenance::of_target(&job);
     row.key = Some(provenance.key().to_owned());
-    row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
     let memory_bytes = check_job(options, &job)?;
     check_replaceable(options, &provenance, &target_provenance)?;
     if options.mode == Mode::DryRun {
         row.status = Status::Planned;
+        row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
         report::print_plan(row, options, &job, memory_bytes);
         return Ok(());
     }
@@ -67,11 +67,9 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let began = Instant::now();
     let status = evolved.ending.status;
     let outputs = outputs_to_write(options, &provenance, &evolved.ending);
-    row.output = outputs.iter().map(|output| output.path.display().to_string()).collect();
-    row.output.extend(options.save_target.iter().map(|output| output.path.display().to_string()));
     let mut files = result::encode(&outputs, evolved, &provenance)?;
     files.extend(result::encode_target(options, &job, &target_provenance)?);
-    interrupt.while_writing(|| result::write(&files))?;
+    interrupt.while_writing(|| result::write(&files, &mut row.output))?;
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {

@@ -114,6 +114,22 @@ fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_takes_no_other_with_it_and_the_row_lists_what_is_there() {
+    let workshop = Workshop::new();
+    std::os::unix::fs::symlink("/dev/full", workshop.path("full.png")).unwrap();
+    let line = "evolve photo.png -n 60 --births 100 -q --json -o a.npz -o full.png -o b.png --save-target t.png";
+    let ran = workshop.run(line);
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("smalti: full.png: the disk is full"), "{}", ran.stderr);
+    let row = ran.row();
+    assert_eq!(row["status"], "failed");
+    assert_eq!(row["output"], serde_json::json!(["a.npz", "b.png", "t.png"]));
+    assert_eq!(workshop.pixels("b.png").dimensions(), (40, 30));
+    assert!(workshop.path("a.npz").is_file() && workshop.path("t.png").is_file());
+}
+
 #[test]
 fn populations_that_do_not_fit_are_refused() {
     let workshop = Workshop::new();
