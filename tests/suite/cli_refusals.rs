@@ -109,6 +109,9 @@ fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
         ("-o - --json", 2, "stdout"),
         ("-o nowhere/a.png", 1, "nowhere/a.png"),
         ("-o folder.png", 1, "folder.png"),
+        ("-o new.png/", 1, "new.png/: is a folder"),
+        ("-o new.npz/.", 1, "new.npz/.: is a folder"),
+        ("-o a.png --save-target new.png/", 1, "new.png/: is a folder"),
     ] {
         refused(&workshop, &format!("evolve photo.png {outputs} {births}"), code, words);
     }
