@@ -59,6 +59,11 @@ impl Destination {
         self.path == Path::new("-")
     }
 
+    /// Whether the bytes go to a reader, as into a device or a pipe, and no file is replaced.
+    pub(super) fn is_stream(&self) -> bool {
+        self.is_stdout() || self.path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir())
+    }
+
     /// Whether a picture is written, rather than a population.
     pub(super) fn is_picture(&self) -> bool {
         self.content != Content::Population

@@ -1,6 +1,7 @@
 //! The result of an evolution: drawn, checked against what was reported, encoded, written.
 
 use super::destination::{Content, Destination};
+use super::interrupt::Interrupt;
 use super::job::Job;
 use super::options::{EvolveOptions, Verbosity};
 use super::provenance::{Ending, Provenance};
@@ -117,13 +118,15 @@ pub(super) fn encode_target<'a>(
 ///
 /// # Errors
 /// The first failure; the files after it are written nevertheless, since hours of work may be in them.
-pub(super) fn write(files: &[EncodedFile<'_>], written: &mut Vec<String>) -> Result<()> {
+pub(super) fn write(files: &[EncodedFile<'_>], interrupt: &mut Interrupt, written: &mut Vec<String>) -> Result<()> {
     let mut outcome = Ok(());
     for EncodedFile { destination, bytes } in files {
         let one = if destination.is_stdout() {
             report::write_stdout(bytes)
-        } else {
+        } else if destination.is_stream() {
             output::write_atomically(&destination.path, bytes)
+        } else {
+            interrupt.while_writing(|| output::write_atomically(&destination.path, bytes))
         };
         if one.is_ok() {
             written.push(destination.path.display().to_string());

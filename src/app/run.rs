@@ -38,7 +38,7 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
 
 /// The work, in order: check, read, evolve and draw, encode and write.
 fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
+    let mut interrupt = Interrupt::listen()?;
     start_threads(options.threads)?;
     destination::check_writable(options.destinations(), &options.input)?;
     let selected = device::select(&options.device, options.validation)?;
@@ -69,7 +69,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let outputs = outputs_to_write(options, &provenance, &evolved.ending);
     let mut files = result::encode(&outputs, evolved, &provenance)?;
     files.extend(result::encode_target(options, &job, &target_provenance)?);
-    interrupt.while_writing(|| result::write(&files, &mut row.output))?;
+    result::write(&files, &mut interrupt, &mut row.output)?;
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {
