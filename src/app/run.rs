@@ -30,6 +30,9 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
         report::error(&error.to_string());
     }
     let printed = if args.json { row.print() } else { Ok(()) };
+    if let Err(error) = &printed {
+        report::error(&error.to_string());
+    }
     match done.and(printed) {
         Ok(()) => ExitCode::from(row.exit_code()),
         Err(error) => ExitCode::from(error.exit_code()),

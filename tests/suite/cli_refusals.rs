@@ -178,6 +178,18 @@ fn a_saved_target_is_replaced_whatever_evolved_towards_it() {
     refused(&workshop, "evolve photo.png -o c.png --save-target a.png", 2, "a.png exists");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_row_that_cannot_be_printed_is_a_failure_with_a_sentence() {
+    let workshop = Workshop::new();
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut command = workshop.command("evolve photo.png -n 60 --births 100 -q --json -o a.png");
+    let output = command.stdout(full).output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.starts_with("smalti: stdout: cannot be written") && stderr.lines().count() == 1, "{stderr:?}");
+}
+
 #[test]
 fn a_failure_has_a_row_of_json_too() {
     let workshop = Workshop::new();
