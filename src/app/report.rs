@@ -216,15 +216,33 @@ pub(super) fn print_json(value: &impl Serialize) -> Result<()> {
     write_stdout(&line)
 }
 
-/// Writes to stdout. That nobody reads on is no failure: the reader has what it wants.
+/// Writes text to stdout. That nobody reads on is no failure: the reader has what it wants.
 pub(super) fn write_stdout(bytes: &[u8]) -> Result<()> {
-    let mut out = io::stdout().lock();
-    match out.write_all(bytes).and_then(|()| out.flush()) {
+    match write_whole(bytes) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Error::output(Path::new("stdout"), format!("cannot be written ({error})")))
         }
         _ => Ok(()),
     }
+}
+
+/// Writes a picture to stdout, all of it: a reader that goes away has no picture.
+pub(super) fn write_picture_to_stdout(bytes: &[u8]) -> Result<()> {
+    write_whole(bytes).map_err(|error| {
+        let reason = match error.kind() {
+            io::ErrorKind::BrokenPipe => {
+                "its reader went away before it had the picture; name a file instead".to_owned()
+            }
+            _ => format!("cannot be written ({error}); name a file instead"),
+        };
+        Error::output(Path::new("stdout"), reason)
+    })
+}
+
+fn write_whole(bytes: &[u8]) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(bytes)?;
+    out.flush()
 }
 
 /// Prints a line to stderr; if that fails there is nowhere left to say so.

@@ -122,7 +122,7 @@ pub(super) fn write(files: &[EncodedFile<'_>], interrupt: &mut Interrupt, writte
     let mut outcome = Ok(());
     for EncodedFile { destination, bytes } in files {
         let one = if destination.is_stdout() {
-            report::write_stdout(bytes)
+            report::write_picture_to_stdout(bytes)
         } else if destination.is_stream() {
             output::write_atomically(&destination.path, bytes)
         } else {
