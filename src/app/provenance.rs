@@ -48,12 +48,46 @@ impl Ending {
     }
 }
 
+/// The provenance of everything that one command writes.
+#[derive(Clone, Debug)]
+pub(super) struct Provenances {
+    /// Of the pictures of the mosaic, at the size that was asked for.
+    pub picture: Provenance,
+    /// Of the population, which has no size of its own.
+    pub population: Provenance,
+    /// Of the fitted picture.
+    pub target: Provenance,
+}
+
+impl Provenances {
+    /// What decides the outputs of `options`; `resized_px` is the longer side of the pictures, unless it is as evolved.
+    pub(super) fn new(options: &EvolveOptions, job: &Job, resized_px: Option<u32>) -> Self {
+        let target_sha256 = hexadecimal(&Sha256::digest(job.target.pixels().as_flattened()));
+        Self {
+            picture: Provenance::of_mosaic(options, job, &target_sha256, resized_px),
+            population: Provenance::of_mosaic(options, job, &target_sha256, None),
+            target: Provenance::of_target(job, &target_sha256),
+        }
+    }
+
+    /// The one that the row of the result tells: of the pictures, if there are any.
+    pub(super) fn of_row(&self, options: &EvolveOptions) -> &Provenance {
+        if options.outputs.iter().any(Destination::is_picture) { &self.picture } else { &self.population }
+    }
+
+    /// The one of an output of the evolution.
+    pub(super) fn of_output(&self, output: &Destination) -> &Provenance {
+        if output.is_picture() { &self.picture } else { &self.population }
+    }
+}
+
 impl Provenance {
     /// What decides a mosaic.
-    pub(super) fn of_mosaic(options: &EvolveOptions, job: &Job) -> Self {
+    fn of_mosaic(options: &EvolveOptions, job: &Job, target_sha256: &str, resized_px: Option<u32>) -> Self {
         let scheme = &options.scheme;
         Self::new(
             job,
+            target_sha256,
             json!({
                 "content": "mosaic",
                 "algorithm": ALGORITHM_VERSION,
@@ -68,20 +102,22 @@ impl Provenance {
                 "on_dry": on_dry_name(scheme.on_dry),
                 "patience": scheme.patience,
                 "target_sae": scheme.target_sae,
-                "time_ms": options.time_limit.map(|limit| limit.as_millis() as u64),
-                "output_size_px": options.output_long_side_px,
+                "time_ms": options.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
+                "output_size_px": resized_px,
             }),
         )
     }
 
     /// What decides the fitted picture.
-    pub(super) fn of_target(job: &Job) -> Self {
-        Self::new(job, json!({ "content": "target" }))
+    fn of_target(job: &Job, target_sha256: &str) -> Self {
+        Self::new(job, target_sha256, json!({ "content": "target" }))
     }
 
-    fn new(job: &Job, specific: Value) -> Self {
+    fn new(job: &Job, target_sha256: &str, specific: Value) -> Self {
         let mut decisive = Map::new();
         decisive.insert("input_sha256".to_owned(), job.input_sha256.clone().into());
+        // The file does not decide alone: another version of a decoder may make other pixels of it.
+        decisive.insert("target_sha256".to_owned(), target_sha256.into());
         decisive.insert("width_px".to_owned(), job.target.width_px().into());
         decisive.insert("height_px".to_owned(), job.target.height_px().into());
         decisive.insert("background".to_owned(), hexadecimal(&job.background).into());

@@ -10,7 +10,7 @@ use super::interrupt::Interrupt;
 use super::job::Job;
 use super::options::{EvolveOptions, Mode, Verbosity};
 use super::progress::Progress;
-use super::provenance::{Ending, Provenance};
+use super::provenance::{Ending, Provenances};
 use super::report::{self, Row, Status};
 use super::result::Evolved;
 use super::watch::Watch;
@@ -54,11 +54,11 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     if options.verbosity > Verbosity::Quiet {
         say_notes(&job, options, &selected);
     }
-    let provenance = Provenance::of_mosaic(options, &job);
-    let target_provenance = Provenance::of_target(&job);
-    row.key = Some(provenance.key().to_owned());
+    let resized_px = result::resized_px(options, job.target.width_px(), job.target.height_px());
+    let provenances = Provenances::new(options, &job, resized_px);
+    row.key = Some(provenances.of_row(options).key().to_owned());
     let memory_bytes = check_job(options, &job)?;
-    check_replaceable(options, &provenance, &target_provenance)?;
+    check_replaceable(options, &provenances)?;
     if options.mode == Mode::DryRun {
         row.status = Status::Planned;
         row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
@@ -69,9 +69,9 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let evolved = evolve_job(options, &job, selected, &interrupt, row)?;
     let began = Instant::now();
     let status = evolved.ending.status;
-    let outputs = outputs_to_write(options, &provenance, &evolved.ending);
-    let mut files = result::encode(&outputs, evolved, &provenance)?;
-    files.extend(result::encode_target(options, &job, &target_provenance)?);
+    let outputs = outputs_to_write(options, &provenances, &evolved.ending);
+    let mut files = result::encode(&outputs, evolved, &provenances)?;
+    files.extend(result::encode_target(options, &job, &provenances.target)?);
     result::write(&files, &mut interrupt, &mut row.output)?;
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
@@ -110,17 +110,21 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
 }
 
 /// Refuses to replace files that are not what this command would write.
-fn check_replaceable(options: &EvolveOptions, mosaic: &Provenance, target: &Provenance) -> Result<()> {
-    let outputs = options.outputs.iter().map(|output| (output, mosaic.key()));
-    let targets = options.save_target.iter().map(|output| (output, target.key()));
+fn check_replaceable(options: &EvolveOptions, provenances: &Provenances) -> Result<()> {
+    let outputs = options.outputs.iter().map(|output| (output, provenances.of_output(output).key()));
+    let targets = options.save_target.iter().map(|output| (output, provenances.target.key()));
     outputs.chain(targets).try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))
 }
 
 /// The outputs without those that hold a better result of the same command.
-fn outputs_to_write<'a>(options: &'a EvolveOptions, provenance: &Provenance, ending: &Ending) -> Vec<&'a Destination> {
-    let key = provenance.key();
-    let (kept, outputs): (Vec<_>, Vec<_>) =
-        options.outputs.iter().partition(|output| destination::should_keep(output, key, ending, options.overwrite));
+fn outputs_to_write<'a>(
+    options: &'a EvolveOptions,
+    provenances: &Provenances,
+    ending: &Ending,
+) -> Vec<&'a Destination> {
+    let (kept, outputs): (Vec<_>, Vec<_>) = options.outputs.iter().partition(|output| {
+        destination::should_keep(output, provenances.of_output(output).key(), ending, options.overwrite)
+    });
     if options.verbosity > Verbosity::Quiet {
         for output in kept {
             let path = output.path.display();

@@ -1,6 +1,7 @@
 //! The command line at work: real runs of the program on small pictures.
 
 use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
 use smalti::photo;
 
 use crate::workshop::Workshop;
@@ -111,7 +112,15 @@ fn the_key_changes_with_what_decides_the_picture_and_with_nothing_else() {
     let workshop = Workshop::new();
     let key = |rest: &str| workshop.evolve_to_row(&format!("-o a.png --dry-run {rest}"))["key"].clone();
     let plain = key("");
-    for rest in ["--threads 1", "--progress none", "-o b.npz", "--save-target t.png", "--size 40", "--force"] {
+    for rest in [
+        "--threads 1",
+        "--progress none",
+        "-o b.npz",
+        "--save-target t.png",
+        "--size 40",
+        "--output-size 40",
+        "--force",
+    ] {
         assert_eq!(key(rest), plain, "{rest}");
     }
     for rest in [
@@ -129,6 +138,31 @@ fn the_key_changes_with_what_decides_the_picture_and_with_nothing_else() {
     ] {
         assert_ne!(key(rest), plain, "{rest}");
     }
+    // In milliseconds this exceeds 64 bits by 384.
+    assert_ne!(key("--time 18446744073709552"), key("--time 384ms"));
+}
+
+#[test]
+fn the_size_of_the_picture_is_no_matter_of_the_population() {
+    let workshop = Workshop::new();
+    let plain = workshop.evolve_to_row("-o a.npz")["key"].clone();
+    let row = workshop.evolve_to_row("-o a.npz -o a.png --output-size 50");
+    assert_ne!(row["key"], plain, "the picture's");
+    assert_eq!(metadata(&workshop, "a.png")["key"], row["key"]);
+    let told = smalti::archive::read(&workshop.path("a.npz")).unwrap().meta;
+    assert_eq!([&told["key"], &told["output_size_px"]], [&plain, &json!(null)]);
+    workshop.evolve("-o b.png --output-size 40");
+    assert_eq!(metadata(&workshop, "b.png")["output_size_px"], json!(null), "it is as evolved");
+}
+
+#[test]
+fn the_pixels_that_are_evolved_towards_decide_too() {
+    let workshop = Workshop::new();
+    let row = workshop.evolve_to_row("-o a.png --save-target t.png");
+    let told = metadata(&workshop, "a.png");
+    assert_eq!(told["target_sha256"], metadata(&workshop, "t.png")["target_sha256"]);
+    let hash: String = Sha256::digest(workshop.pixels("t.png").as_raw()).iter().map(|b| format!("{b:02x}")).collect();
+    assert_eq!([&told["target_sha256"], &told["key"]], [&json!(hash), &row["key"]]);
 }
 
 #[test]
