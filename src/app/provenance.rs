@@ -37,6 +37,7 @@ pub(super) struct Ending {
     pub stop: StopReason,
     pub sae: u64,
     pub outcome: Outcome,
+    pub births_in_last_run: u64,
 }
 
 impl Ending {
@@ -44,7 +45,13 @@ impl Ending {
     pub(super) fn of(evolution: &Evolution) -> Self {
         let stop = evolution.stop_reason().unwrap_or(StopReason::Births);
         let status = if stop == StopReason::Interrupted { Status::Partial } else { Status::Complete };
-        Self { status, stop, sae: evolution.best_sae().unwrap_or_default(), outcome: evolution.outcome() }
+        Self {
+            status,
+            stop,
+            sae: evolution.best_sae().unwrap_or_default(),
+            outcome: evolution.outcome(),
+            births_in_last_run: evolution.births_in_run(),
+        }
     }
 }
 
@@ -141,11 +148,12 @@ impl Provenance {
         told.insert("software".to_owned(), SOFTWARE.into());
         told.insert("version".to_owned(), env!("CARGO_PKG_VERSION").into());
         told.insert("key".to_owned(), self.key.clone().into());
-        if let Some(Ending { status, stop, sae, outcome }) = ending {
+        if let Some(Ending { status, stop, sae, outcome, births_in_last_run }) = ending {
             told.insert("status".to_owned(), json!(status));
             told.insert("stop".to_owned(), stop.word().into());
             told.insert("sae".to_owned(), (*sae).into());
             told.insert("births".to_owned(), outcome.births.into());
+            told.insert("births_in_last_run".to_owned(), (*births_in_last_run).into());
             told.insert("fallback_kills".to_owned(), outcome.fallback_kills.into());
             told.insert("restarts_made".to_owned(), outcome.restarts.into());
         }
@@ -242,7 +250,13 @@ mod tests {
 
     #[test]
     fn of_two_results_of_one_command_the_complete_one_is_better_and_then_the_lower_sae() {
-        let ending = |status, sae| Ending { status, stop: StopReason::Time, sae, outcome: Outcome::default() };
+        let ending = |status, sae| Ending {
+            status,
+            stop: StopReason::Time,
+            sae,
+            outcome: Outcome::default(),
+            births_in_last_run: 0,
+        };
         let story = |is_complete, sae| Story { key: String::new(), is_complete, sae: Some(sae) };
         for (is_complete, old_sae, status, new_sae, stays) in [
             (true, 9, Status::Partial, 8, true),

@@ -49,6 +49,8 @@ pub(super) struct Row {
     pub psnr: Option<f64>,
     pub tiles: Option<usize>,
     pub births: u64,
+    /// Births of the last run, which is the one that the clock or an interrupt cut.
+    pub births_in_last_run: u64,
     /// Candidates that were evaluated.
     pub evals: u64,
     pub fallback_kills: u64,
@@ -82,6 +84,7 @@ impl Row {
             psnr: None,
             tiles: None,
             births: 0,
+            births_in_last_run: 0,
             evals: 0,
             fallback_kills: 0,
             restarts: 0,
@@ -103,6 +106,7 @@ impl Row {
         self.sae = evolution.best_sae();
         self.objective = self.sae;
         self.births = outcome.births;
+        self.births_in_last_run = evolution.births_in_run();
         self.evals = outcome.births;
         self.fallback_kills = outcome.fallback_kills;
         self.restarts = outcome.restarts;

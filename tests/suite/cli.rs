@@ -64,6 +64,7 @@ fn the_row_of_json_tells_the_result_and_agrees_with_the_files() {
         ("scheme", json!("paper")),
         ("tiles", json!(60)),
         ("births", json!(900)),
+        ("births_in_last_run", json!(300)),
         ("evals", json!(900)),
         ("restarts", json!(2)),
         ("device", json!("CPU")),
@@ -201,6 +202,18 @@ fn budgets_end_an_evolution_and_are_named_as_the_reason() {
         assert_eq!(ran.code, Some(0), "{rest}: {}", ran.stderr);
         assert_eq!([&ran.row()["stop"], &ran.row()["status"]], [stop, "complete"], "{rest}");
     }
+}
+
+#[test]
+fn a_run_that_the_clock_cut_can_be_repeated_from_what_was_told() {
+    let workshop = Workshop::new();
+    let row =
+        workshop.run("evolve photo.png -n 60 -o a.png --json --births 1000 --restarts 1000000 --time 300ms").row();
+    assert_eq!(row["stop"], "time");
+    let [births, restarts, last] =
+        ["births", "restarts", "births_in_last_run"].map(|field| row[field].as_u64().unwrap());
+    assert_eq!(births, restarts * 1000 + last);
+    assert_eq!(metadata(&workshop, "a.png")["births_in_last_run"], last);
 }
 
 #[test]
