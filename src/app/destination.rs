@@ -83,6 +83,10 @@ pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destinat
                 let sentence = "-o - would write a picture to the terminal; redirect it to a file or a pipe";
                 return Err(Error::Usage(sentence.to_owned()));
             }
+            if stdout_is_closed() {
+                let reason = "is closed, and -o - would lose the picture; redirect it to a file or a pipe";
+                return Err(Error::output(Path::new("stdout"), reason));
+            }
         } else {
             if place == place_of(input) {
                 return Err(Error::Usage(format!(
@@ -119,6 +123,26 @@ pub(super) fn should_keep(destination: &Destination, key: &str, ending: &Ending,
         return false;
     }
     provenance::story_of_file(destination).is_some_and(|found| found.key == key && found.is_better_than(ending))
+}
+
+/// Whether the program was begun without a stdout.
+///
+/// Rust then opens the null device in its place, for reading too, which a redirection to it does not do.
+#[cfg(unix)]
+fn stdout_is_closed() -> bool {
+    use std::io::Read;
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::MetadataExt;
+    let Ok(descriptor) = std::io::stdout().as_fd().try_clone_to_owned() else { return true };
+    let mut file = std::fs::File::from(descriptor);
+    let device = |found: std::fs::Metadata| found.rdev();
+    let null = std::fs::metadata("/dev/null").map(device).ok();
+    null.is_some() && file.metadata().map(device).ok() == null && file.read(&mut [0]).is_ok()
+}
+
+#[cfg(not(unix))]
+fn stdout_is_closed() -> bool {
+    false
 }
 
 /// One name for one file, however it was written.

@@ -180,6 +180,26 @@ fn a_saved_target_is_replaced_whatever_evolved_towards_it() {
 
 #[cfg(target_os = "linux")]
 #[test]
+fn a_picture_for_a_closed_stdout_is_refused_before_the_work_and_the_null_device_may_have_it() {
+    let workshop = Workshop::new();
+    for (redirection, births, code, message) in
+        [(">&-", "1000M", 1, "smalti: stdout: is closed"), ("> /dev/null", "100", 0, "")]
+    {
+        let line = format!(
+            "exec {} evolve photo.png -q -n 60 --births {births} -o - {redirection}",
+            env!("CARGO_BIN_EXE_smalti")
+        );
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", &line]).current_dir(workshop.path("")).env("SMALTI_DEVICE", "cpu");
+        let output = command.output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{stderr}");
+        assert!(stderr.starts_with(message) && stderr.lines().count() == usize::from(code == 1), "{stderr:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
 fn a_row_that_cannot_be_printed_is_a_failure_with_a_sentence() {
     let workshop = Workshop::new();
     let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
