@@ -5,7 +5,7 @@
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, is_separator};
 
 use tempfile::NamedTempFile;
 
@@ -61,6 +61,9 @@ enum Place {
 
 impl Place {
     fn of(path: &Path) -> io::Result<Self> {
+        if names_a_folder(path) {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
         match fs::metadata(path) {
             Ok(found) if found.is_dir() => Err(io::ErrorKind::IsADirectory.into()),
             Ok(found) if found.is_file() => Ok(Self::File { target: fs::canonicalize(path)?, old: Some(found) }),
@@ -71,6 +74,12 @@ impl Place {
             Err(error) => Err(error),
         }
     }
+}
+
+/// Whether `path` ends in a separator or in `.`: `Path` overlooks both, but no file can take such a name.
+fn names_a_folder(path: &Path) -> bool {
+    let last = path.as_os_str().as_encoded_bytes().rsplit(|&byte| is_separator(char::from(byte))).next();
+    matches!(last, Some(b"" | b"."))
 }
 
 /// An empty temporary file in the folder of `target`: only within one file system is a rename a single step.

@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
 use super::options::Overwrite;
-use super::provenance;
+use super::provenance::{self, Ending};
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -59,6 +59,11 @@ impl Destination {
         self.path == Path::new("-")
     }
 
+    /// Whether the bytes go to a reader, as into a device or a pipe, and no file is replaced.
+    pub(super) fn is_stream(&self) -> bool {
+        self.is_stdout() || self.path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir())
+    }
+
     /// Whether a picture is written, rather than a population.
     pub(super) fn is_picture(&self) -> bool {
         self.content != Content::Population
@@ -77,6 +82,10 @@ pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destinat
             if std::io::stdout().is_terminal() {
                 let sentence = "-o - would write a picture to the terminal; redirect it to a file or a pipe";
                 return Err(Error::Usage(sentence.to_owned()));
+            }
+            if stdout_is_closed() {
+                let reason = "is closed, and -o - would lose the picture; redirect it to a file or a pipe";
+                return Err(Error::output(Path::new("stdout"), reason));
             }
         } else {
             if place == place_of(input) {
@@ -98,13 +107,42 @@ pub(super) fn check_replaceable(destination: &Destination, key: &str, overwrite:
     if overwrite == Overwrite::Force || destination.is_stdout() || !destination.path.is_file() {
         return Ok(());
     }
-    let why = match provenance::key_of_file(destination) {
-        Some(found) if found == key => return Ok(()),
+    let why = match provenance::story_of_file(destination) {
+        Some(found) if found.key == key => return Ok(()),
         Some(_) => "made with other options",
         None => "not made by smalti",
     };
     let path = destination.path.display();
     Err(Error::Usage(format!("{path} exists and was {why}; name another file, or replace it with --force")))
+}
+
+/// Whether the file that is there holds a better result of the same command, which must not be lost: a run may end
+/// earlier than the one before it, by Ctrl-C or by the clock.
+pub(super) fn should_keep(destination: &Destination, key: &str, ending: &Ending, overwrite: Overwrite) -> bool {
+    if overwrite == Overwrite::Force || destination.is_stdout() || !destination.path.is_file() {
+        return false;
+    }
+    provenance::story_of_file(destination).is_some_and(|found| found.key == key && found.is_better_than(ending))
+}
+
+/// Whether the program was begun without a stdout.
+///
+/// Rust then opens the null device in its place, for reading too, which a redirection to it does not do.
+#[cfg(unix)]
+fn stdout_is_closed() -> bool {
+    use std::io::Read;
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::MetadataExt;
+    let Ok(descriptor) = std::io::stdout().as_fd().try_clone_to_owned() else { return true };
+    let mut file = std::fs::File::from(descriptor);
+    let device = |found: std::fs::Metadata| found.rdev();
+    let null = std::fs::metadata("/dev/null").map(device).ok();
+    null.is_some() && file.metadata().map(device).ok() == null && file.read(&mut [0]).is_ok()
+}
+
+#[cfg(not(unix))]
+fn stdout_is_closed() -> bool {
+    false
 }
 
 /// One name for one file, however it was written.

@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use signal_hook::consts::SIGINT;
-use signal_hook::flag;
+use signal_hook::low_level::unregister;
+use signal_hook::{SigId, flag};
 
 use crate::error::{Error, Result};
 
@@ -19,29 +20,37 @@ const SIGNALS: [i32; 3] = [SIGINT, signal_hook::consts::SIGTERM, signal_hook::co
 const SIGNALS: [i32; 2] = [SIGINT, signal_hook::consts::SIGTERM];
 
 /// Whether somebody asked for the work to end.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Interrupt {
     requested: Arc<AtomicBool>,
     /// Whether the next Ctrl-C ends the process.
     armed: Arc<AtomicBool>,
+    /// The actions of the signals that set `armed`.
+    arming: Vec<SigId>,
 }
 
 impl Interrupt {
     /// Listens to the signals from now on.
     pub(super) fn listen() -> Result<Self> {
-        let interrupt = Self::default();
+        let mut interrupt = Self::default();
         interrupt
             .register()
             .map_err(|error| Error::Internal(format!("the handlers of signals cannot be installed ({error})")))?;
         Ok(interrupt)
     }
 
-    fn register(&self) -> std::io::Result<()> {
+    fn register(&mut self) -> std::io::Result<()> {
         // Before the flags: actions run in this order, and the first Ctrl-C must find `armed` still false.
         flag::register_conditional_shutdown(SIGINT, EXIT_AT_ONCE, Arc::clone(&self.armed))?;
         for signal in SIGNALS {
             flag::register(signal, Arc::clone(&self.requested))?;
-            flag::register(signal, Arc::clone(&self.armed))?;
+        }
+        self.register_arming()
+    }
+
+    fn register_arming(&mut self) -> std::io::Result<()> {
+        for signal in SIGNALS {
+            self.arming.push(flag::register(signal, Arc::clone(&self.armed))?);
         }
         Ok(())
     }
@@ -51,11 +60,40 @@ impl Interrupt {
         self.requested.load(Ordering::Relaxed)
     }
 
-    /// Runs `write`, which must not be cut short by a second Ctrl-C: it would leave a temporary file behind.
-    pub(super) fn while_writing<T>(&self, write: impl FnOnce() -> T) -> T {
+    /// Runs `write`, which no Ctrl-C may cut short: it would leave a temporary file behind.
+    ///
+    /// Only for what ends by itself: a write that waits for a reader could not be ended.
+    pub(super) fn while_writing<T>(&mut self, write: impl FnOnce() -> T) -> T {
+        // First, so that no signal can arm it again.
+        self.arming.drain(..).for_each(|action| {
+            unregister(action);
+        });
         self.armed.store(false, Ordering::Relaxed);
         let written = write();
-        self.armed.store(self.is_requested(), Ordering::Relaxed);
+        // If it cannot be armed, nothing is left to protect, and the end is near.
+        let _ = self.register_arming();
+        if self.is_requested() {
+            self.armed.store(true, Ordering::Relaxed);
+        }
         written
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use signal_hook::low_level::raise;
+
+    use super::*;
+
+    #[test]
+    fn no_ctrl_c_ends_the_process_while_it_writes_and_the_next_one_after_it_would() {
+        let mut interrupt = Interrupt::listen().expect("signals can be handled");
+        interrupt.while_writing(|| {
+            for _ in 0..3 {
+                raise(SIGINT).expect("the signal is sent");
+            }
+        });
+        assert!(interrupt.is_requested());
+        assert!(interrupt.armed.load(Ordering::Relaxed), "but none may come: it would end this test");
     }
 }

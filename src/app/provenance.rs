@@ -37,6 +37,7 @@ pub(super) struct Ending {
     pub stop: StopReason,
     pub sae: u64,
     pub outcome: Outcome,
+    pub births_in_last_run: u64,
 }
 
 impl Ending {
@@ -44,16 +45,56 @@ impl Ending {
     pub(super) fn of(evolution: &Evolution) -> Self {
         let stop = evolution.stop_reason().unwrap_or(StopReason::Births);
         let status = if stop == StopReason::Interrupted { Status::Partial } else { Status::Complete };
-        Self { status, stop, sae: evolution.best_sae().unwrap_or_default(), outcome: evolution.outcome() }
+        Self {
+            status,
+            stop,
+            sae: evolution.best_sae().unwrap_or_default(),
+            outcome: evolution.outcome(),
+            births_in_last_run: evolution.births_in_run(),
+        }
+    }
+}
+
+/// The provenance of everything that one command writes.
+#[derive(Clone, Debug)]
+pub(super) struct Provenances {
+    /// Of the pictures of the mosaic, at the size that was asked for.
+    pub picture: Provenance,
+    /// Of the population, which has no size of its own.
+    pub population: Provenance,
+    /// Of the fitted picture.
+    pub target: Provenance,
+}
+
+impl Provenances {
+    /// What decides the outputs of `options`; `resized_px` is the longer side of the pictures, unless it is as evolved.
+    pub(super) fn new(options: &EvolveOptions, job: &Job, resized_px: Option<u32>) -> Self {
+        let target_sha256 = hexadecimal(&Sha256::digest(job.target.pixels().as_flattened()));
+        Self {
+            picture: Provenance::of_mosaic(options, job, &target_sha256, resized_px),
+            population: Provenance::of_mosaic(options, job, &target_sha256, None),
+            target: Provenance::of_target(job, &target_sha256),
+        }
+    }
+
+    /// The one that the row of the result tells: of the pictures, if there are any.
+    pub(super) fn of_row(&self, options: &EvolveOptions) -> &Provenance {
+        if options.outputs.iter().any(Destination::is_picture) { &self.picture } else { &self.population }
+    }
+
+    /// The one of an output of the evolution.
+    pub(super) fn of_output(&self, output: &Destination) -> &Provenance {
+        if output.is_picture() { &self.picture } else { &self.population }
     }
 }
 
 impl Provenance {
     /// What decides a mosaic.
-    pub(super) fn of_mosaic(options: &EvolveOptions, job: &Job) -> Self {
+    fn of_mosaic(options: &EvolveOptions, job: &Job, target_sha256: &str, resized_px: Option<u32>) -> Self {
         let scheme = &options.scheme;
         Self::new(
             job,
+            target_sha256,
             json!({
                 "content": "mosaic",
                 "algorithm": ALGORITHM_VERSION,
@@ -68,20 +109,22 @@ impl Provenance {
                 "on_dry": on_dry_name(scheme.on_dry),
                 "patience": scheme.patience,
                 "target_sae": scheme.target_sae,
-                "time_ms": options.time_limit.map(|limit| limit.as_millis() as u64),
-                "output_size_px": options.output_long_side_px,
+                "time_ms": options.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
+                "output_size_px": resized_px,
             }),
         )
     }
 
     /// What decides the fitted picture.
-    pub(super) fn of_target(job: &Job) -> Self {
-        Self::new(job, json!({ "content": "target" }))
+    fn of_target(job: &Job, target_sha256: &str) -> Self {
+        Self::new(job, target_sha256, json!({ "content": "target" }))
     }
 
-    fn new(job: &Job, specific: Value) -> Self {
+    fn new(job: &Job, target_sha256: &str, specific: Value) -> Self {
         let mut decisive = Map::new();
         decisive.insert("input_sha256".to_owned(), job.input_sha256.clone().into());
+        // The file does not decide alone: another version of a decoder may make other pixels of it.
+        decisive.insert("target_sha256".to_owned(), target_sha256.into());
         decisive.insert("width_px".to_owned(), job.target.width_px().into());
         decisive.insert("height_px".to_owned(), job.target.height_px().into());
         decisive.insert("background".to_owned(), hexadecimal(&job.background).into());
@@ -105,11 +148,12 @@ impl Provenance {
         told.insert("software".to_owned(), SOFTWARE.into());
         told.insert("version".to_owned(), env!("CARGO_PKG_VERSION").into());
         told.insert("key".to_owned(), self.key.clone().into());
-        if let Some(Ending { status, stop, sae, outcome }) = ending {
+        if let Some(Ending { status, stop, sae, outcome, births_in_last_run }) = ending {
             told.insert("status".to_owned(), json!(status));
             told.insert("stop".to_owned(), stop.word().into());
             told.insert("sae".to_owned(), (*sae).into());
             told.insert("births".to_owned(), outcome.births.into());
+            told.insert("births_in_last_run".to_owned(), (*births_in_last_run).into());
             told.insert("fallback_kills".to_owned(), outcome.fallback_kills.into());
             told.insert("restarts_made".to_owned(), outcome.restarts.into());
         }
@@ -132,14 +176,40 @@ impl Provenance {
     }
 }
 
-/// The key in the file at a destination, if smalti wrote it.
-pub(super) fn key_of_file(destination: &Destination) -> Option<String> {
+/// What a file tells about the result in it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Story {
+    pub key: String,
+    /// Whether its evolution came to its end.
+    pub is_complete: bool,
+    /// None for a fitted picture.
+    pub sae: Option<u64>,
+}
+
+impl Story {
+    /// Whether the file should stay rather than make room for a result with the same key that ended like `ending`.
+    ///
+    /// Both are cut from one course of births, so the lower SAE is the one that got farther.
+    pub(super) fn is_better_than(&self, ending: &Ending) -> bool {
+        let new_is_complete = ending.status == Status::Complete;
+        if self.is_complete != new_is_complete {
+            return self.is_complete;
+        }
+        self.sae.is_some_and(|sae| sae < ending.sae)
+    }
+}
+
+/// The story of the file at a destination, if smalti wrote it.
+pub(super) fn story_of_file(destination: &Destination) -> Option<Story> {
     let told = match destination.content {
         Content::Population => archive::read_meta(&destination.path).ok()?,
         Content::Png | Content::Jpeg => picture_description(photo::read_metadata(&destination.path)).ok()??,
     };
-    let is_ours = told.get("software").and_then(Value::as_str) == Some(SOFTWARE);
-    told.get("key").and_then(Value::as_str).filter(|_| is_ours).map(str::to_owned)
+    let text = |key| told.get(key).and_then(Value::as_str);
+    let key = text("key").filter(|_| text("software") == Some(SOFTWARE))?.to_owned();
+    // An unknown word is a result that somebody may want to keep.
+    let is_complete = text("status") != Some("partial");
+    Some(Story { key, is_complete, sae: told.get("sae").and_then(Value::as_u64) })
 }
 
 fn picture_description(metadata: Result<Metadata>) -> Result<Option<Map<String, Value>>> {
@@ -172,4 +242,32 @@ fn population_sha256(population: &Population) -> String {
 
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_results_of_one_command_the_complete_one_is_better_and_then_the_lower_sae() {
+        let ending = |status, sae| Ending {
+            status,
+            stop: StopReason::Time,
+            sae,
+            outcome: Outcome::default(),
+            births_in_last_run: 0,
+        };
+        let story = |is_complete, sae| Story { key: String::new(), is_complete, sae: Some(sae) };
+        for (is_complete, old_sae, status, new_sae, stays) in [
+            (true, 9, Status::Partial, 8, true),
+            (false, 8, Status::Complete, 9, false),
+            (true, 8, Status::Complete, 9, true),
+            (true, 9, Status::Complete, 8, false),
+            (true, 9, Status::Complete, 9, false),
+            (false, 8, Status::Partial, 9, true),
+        ] {
+            let is_better = story(is_complete, old_sae).is_better_than(&ending(status, new_sae));
+            assert_eq!(is_better, stays, "{is_complete} {old_sae}, then {status:?} {new_sae}");
+        }
+    }
 }

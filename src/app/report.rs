@@ -24,7 +24,7 @@ pub(super) enum Status {
     Partial,
     /// Not evolved: only a dry run.
     Planned,
-    /// Nothing was written.
+    /// Not all outputs were written.
     Failed,
 }
 
@@ -49,6 +49,8 @@ pub(super) struct Row {
     pub psnr: Option<f64>,
     pub tiles: Option<usize>,
     pub births: u64,
+    /// Births of the last run, which is the one that the clock or an interrupt cut.
+    pub births_in_last_run: u64,
     /// Candidates that were evaluated.
     pub evals: u64,
     pub fallback_kills: u64,
@@ -82,6 +84,7 @@ impl Row {
             psnr: None,
             tiles: None,
             births: 0,
+            births_in_last_run: 0,
             evals: 0,
             fallback_kills: 0,
             restarts: 0,
@@ -103,15 +106,15 @@ impl Row {
         self.sae = evolution.best_sae();
         self.objective = self.sae;
         self.births = outcome.births;
+        self.births_in_last_run = evolution.births_in_run();
         self.evals = outcome.births;
         self.fallback_kills = outcome.fallback_kills;
         self.restarts = outcome.restarts;
     }
 
-    /// Takes in why there is no result.
+    /// Takes in why there is no result, or not all of it.
     pub(super) fn note_failure(&mut self, error: &Error) {
         self.status = Status::Failed;
-        self.output.clear();
         self.error = Some(error.to_string());
     }
 
@@ -174,7 +177,8 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
         say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
     }
     let partial = if row.status == Status::Partial { " (partial: run the same command again)" } else { "" };
-    say(&format!("wrote {}{partial}", row.output.join(", ")));
+    let written = if row.output.is_empty() { "nothing".to_owned() } else { row.output.join(", ") };
+    say(&format!("wrote {written}{partial}"));
 }
 
 /// What a dry run says.
@@ -216,15 +220,33 @@ pub(super) fn print_json(value: &impl Serialize) -> Result<()> {
     write_stdout(&line)
 }
 
-/// Writes to stdout. That nobody reads on is no failure: the reader has what it wants.
+/// Writes text to stdout. That nobody reads on is no failure: the reader has what it wants.
 pub(super) fn write_stdout(bytes: &[u8]) -> Result<()> {
-    let mut out = io::stdout().lock();
-    match out.write_all(bytes).and_then(|()| out.flush()) {
+    match write_whole(bytes) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Error::output(Path::new("stdout"), format!("cannot be written ({error})")))
         }
         _ => Ok(()),
     }
+}
+
+/// Writes a picture to stdout, all of it: a reader that goes away has no picture.
+pub(super) fn write_picture_to_stdout(bytes: &[u8]) -> Result<()> {
+    write_whole(bytes).map_err(|error| {
+        let reason = match error.kind() {
+            io::ErrorKind::BrokenPipe => {
+                "its reader went away before it had the picture; name a file instead".to_owned()
+            }
+            _ => format!("cannot be written ({error}); name a file instead"),
+        };
+        Error::output(Path::new("stdout"), reason)
+    })
+}
+
+fn write_whole(bytes: &[u8]) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(bytes)?;
+    out.flush()
 }
 
 /// Prints a line to stderr; if that fails there is nowhere left to say so.

@@ -1,9 +1,10 @@
 //! The result of an evolution: drawn, checked against what was reported, encoded, written.
 
 use super::destination::{Content, Destination};
+use super::interrupt::Interrupt;
 use super::job::Job;
 use super::options::{EvolveOptions, Verbosity};
-use super::provenance::{Ending, Provenance};
+use super::provenance::{Ending, Provenance, Provenances};
 use super::report;
 use crate::archive;
 use crate::error::{Error, Result};
@@ -58,8 +59,7 @@ pub(super) fn draw(
             ending.sae
         )));
     }
-    let long_side_px = options.output_long_side_px.filter(|&long| long != width_px.max(height_px));
-    let resized = match long_side_px {
+    let resized = match resized_px(options, width_px, height_px) {
         Some(long) if options.outputs.iter().any(Destination::is_picture) => {
             let canvas = Canvas::scaled(width_px, height_px, long);
             if options.verbosity > Verbosity::Quiet {
@@ -72,6 +72,11 @@ pub(super) fn draw(
     Ok(Evolved { ending, population, marginal, mosaic, resized })
 }
 
+/// Longer side of the written picture in px, if it differs from the size at which the mosaic was evolved.
+pub(super) fn resized_px(options: &EvolveOptions, width_px: u32, height_px: u32) -> Option<u32> {
+    options.output_long_side_px.filter(|&long| long != width_px.max(height_px))
+}
+
 /// As many samples along each side of a pixel as the largest canvas allows.
 fn supersampling(long_side_px: u32) -> u32 {
     (1..=SUPERSAMPLING_MAX).rev().find(|factor| long_side_px * factor <= TARGET_SIDE_MAX_PX).unwrap_or(1)
@@ -79,25 +84,25 @@ fn supersampling(long_side_px: u32) -> u32 {
 
 /// The outputs as bytes; nothing is written before all of them are there.
 pub(super) fn encode<'a>(
-    options: &'a EvolveOptions,
+    outputs: &[&'a Destination],
     evolved: Evolved,
-    provenance: &Provenance,
+    provenances: &Provenances,
 ) -> Result<Vec<EncodedFile<'a>>> {
     let Mosaic { width_px, height_px, pixels } = evolved.resized.unwrap_or(evolved.mosaic);
     let photo = Photo { width_px, height_px, pixels };
-    let metadata = provenance.picture_metadata(Some(&evolved.ending));
+    let metadata = provenances.picture.picture_metadata(Some(&evolved.ending));
     let encode_one = |destination: &'a Destination| {
         let bytes = match destination.content {
             Content::Png => photo::encode_png(&photo, &metadata),
             Content::Jpeg => photo::encode_jpeg(&photo, JPEG_QUALITY, &metadata),
             Content::Population => {
-                let told = provenance.population_metadata(&evolved.ending);
+                let told = provenances.population.population_metadata(&evolved.ending);
                 archive::encode(&evolved.population, &evolved.marginal, &told)
             }
         }?;
         Ok(EncodedFile { destination, bytes })
     };
-    options.outputs.iter().map(encode_one).collect()
+    outputs.iter().copied().map(encode_one).collect()
 }
 
 /// The file of `--save-target`, if it was asked for.
@@ -113,15 +118,26 @@ pub(super) fn encode_target<'a>(
     Ok(Some(EncodedFile { destination, bytes }))
 }
 
-/// Writes the files one after the other, each in one step.
-pub(super) fn write(files: &[EncodedFile<'_>]) -> Result<()> {
-    files.iter().try_for_each(|EncodedFile { destination, bytes }| {
-        if destination.is_stdout() {
-            report::write_stdout(bytes)
-        } else {
+/// Writes the files one after the other, each in one step, and adds to `written` those that are there now.
+///
+/// # Errors
+/// The first failure; the files after it are written nevertheless, since hours of work may be in them.
+pub(super) fn write(files: &[EncodedFile<'_>], interrupt: &mut Interrupt, written: &mut Vec<String>) -> Result<()> {
+    let mut outcome = Ok(());
+    for EncodedFile { destination, bytes } in files {
+        let one = if destination.is_stdout() {
+            report::write_picture_to_stdout(bytes)
+        } else if destination.is_stream() {
             output::write_atomically(&destination.path, bytes)
+        } else {
+            interrupt.while_writing(|| output::write_atomically(&destination.path, bytes))
+        };
+        if one.is_ok() {
+            written.push(destination.path.display().to_string());
         }
-    })
+        outcome = outcome.and(one);
+    }
+    outcome
 }
 
 #[cfg(test)]

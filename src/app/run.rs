@@ -4,12 +4,13 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use super::cli::EvolveArgs;
+use super::destination::Destination;
 use super::device::{self, Opened, Selected};
 use super::interrupt::Interrupt;
 use super::job::Job;
 use super::options::{EvolveOptions, Mode, Verbosity};
 use super::progress::Progress;
-use super::provenance::{Ending, Provenance};
+use super::provenance::{Ending, Provenances};
 use super::report::{self, Row, Status};
 use super::result::Evolved;
 use super::watch::Watch;
@@ -29,6 +30,9 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
         report::error(&error.to_string());
     }
     let printed = if args.json { row.print() } else { Ok(()) };
+    if let Err(error) = &printed {
+        report::error(&error.to_string());
+    }
     match done.and(printed) {
         Ok(()) => ExitCode::from(row.exit_code()),
         Err(error) => ExitCode::from(error.exit_code()),
@@ -37,7 +41,7 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
 
 /// The work, in order: check, read, evolve and draw, encode and write.
 fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
+    let mut interrupt = Interrupt::listen()?;
     start_threads(options.threads)?;
     destination::check_writable(options.destinations(), &options.input)?;
     let selected = device::select(&options.device, options.validation)?;
@@ -50,14 +54,14 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     if options.verbosity > Verbosity::Quiet {
         say_notes(&job, options, &selected);
     }
-    let provenance = Provenance::of_mosaic(options, &job);
-    let target_provenance = Provenance::of_target(&job);
-    row.key = Some(provenance.key().to_owned());
-    row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
+    let resized_px = result::resized_px(options, job.target.width_px(), job.target.height_px());
+    let provenances = Provenances::new(options, &job, resized_px);
+    row.key = Some(provenances.of_row(options).key().to_owned());
     let memory_bytes = check_job(options, &job)?;
-    check_replaceable(options, &provenance, &target_provenance)?;
+    check_replaceable(options, &provenances)?;
     if options.mode == Mode::DryRun {
         row.status = Status::Planned;
+        row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
         report::print_plan(row, options, &job, memory_bytes);
         return Ok(());
     }
@@ -65,9 +69,10 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let evolved = evolve_job(options, &job, selected, &interrupt, row)?;
     let began = Instant::now();
     let status = evolved.ending.status;
-    let mut files = result::encode(options, evolved, &provenance)?;
-    files.extend(result::encode_target(options, &job, &target_provenance)?);
-    interrupt.while_writing(|| result::write(&files))?;
+    let outputs = outputs_to_write(options, &provenances, &evolved.ending);
+    let mut files = result::encode(&outputs, evolved, &provenances)?;
+    files.extend(result::encode_target(options, &job, &provenances.target)?);
+    result::write(&files, &mut interrupt, &mut row.output)?;
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {
@@ -105,10 +110,28 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
 }
 
 /// Refuses to replace files that are not what this command would write.
-fn check_replaceable(options: &EvolveOptions, mosaic: &Provenance, target: &Provenance) -> Result<()> {
-    let outputs = options.outputs.iter().map(|output| (output, mosaic.key()));
-    let targets = options.save_target.iter().map(|output| (output, target.key()));
+fn check_replaceable(options: &EvolveOptions, provenances: &Provenances) -> Result<()> {
+    let outputs = options.outputs.iter().map(|output| (output, provenances.of_output(output).key()));
+    let targets = options.save_target.iter().map(|output| (output, provenances.target.key()));
     outputs.chain(targets).try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))
+}
+
+/// The outputs without those that hold a better result of the same command.
+fn outputs_to_write<'a>(
+    options: &'a EvolveOptions,
+    provenances: &Provenances,
+    ending: &Ending,
+) -> Vec<&'a Destination> {
+    let (kept, outputs): (Vec<_>, Vec<_>) = options.outputs.iter().partition(|output| {
+        destination::should_keep(output, provenances.of_output(output).key(), ending, options.overwrite)
+    });
+    if options.verbosity > Verbosity::Quiet {
+        for output in kept {
+            let path = output.path.display();
+            report::say(&format!("smalti: {path} is kept: the same command got farther when it wrote it"));
+        }
+    }
+    outputs
 }
 
 /// Says what somebody should know before the work begins.

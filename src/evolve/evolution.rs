@@ -139,6 +139,12 @@ impl Evolution {
         self.outcome
     }
 
+    /// Births of the current run, or of the last one: fewer than planned if it was cut.
+    #[must_use]
+    pub fn births_in_run(&self) -> u64 {
+        self.births_in_run
+    }
+
     /// Births that all runs make if nothing stops them.
     #[must_use]
     pub fn births_planned(&self) -> u64 {

@@ -109,9 +109,28 @@ fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
         ("-o - --json", 2, "stdout"),
         ("-o nowhere/a.png", 1, "nowhere/a.png"),
         ("-o folder.png", 1, "folder.png"),
+        ("-o new.png/", 1, "new.png/: is a folder"),
+        ("-o new.npz/.", 1, "new.npz/.: is a folder"),
+        ("-o a.png --save-target new.png/", 1, "new.png/: is a folder"),
     ] {
         refused(&workshop, &format!("evolve photo.png {outputs} {births}"), code, words);
     }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_takes_no_other_with_it_and_the_row_lists_what_is_there() {
+    let workshop = Workshop::new();
+    std::os::unix::fs::symlink("/dev/full", workshop.path("full.png")).unwrap();
+    let line = "evolve photo.png -n 60 --births 100 -q --json -o a.npz -o full.png -o b.png --save-target t.png";
+    let ran = workshop.run(line);
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("smalti: full.png: the disk is full"), "{}", ran.stderr);
+    let row = ran.row();
+    assert_eq!(row["status"], "failed");
+    assert_eq!(row["output"], serde_json::json!(["a.npz", "b.png", "t.png"]));
+    assert_eq!(workshop.pixels("b.png").dimensions(), (40, 30));
+    assert!(workshop.path("a.npz").is_file() && workshop.path("t.png").is_file());
 }
 
 #[test]
@@ -157,6 +176,38 @@ fn a_saved_target_is_replaced_whatever_evolved_towards_it() {
     workshop.evolve("-o b.png --save-target t.png --seed 1");
     refused(&workshop, "evolve photo.png -o c.png --save-target t.png --size 20", 2, "t.png exists");
     refused(&workshop, "evolve photo.png -o c.png --save-target a.png", 2, "a.png exists");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_picture_for_a_closed_stdout_is_refused_before_the_work_and_the_null_device_may_have_it() {
+    let workshop = Workshop::new();
+    for (redirection, births, code, message) in
+        [(">&-", "1000M", 1, "smalti: stdout: is closed"), ("> /dev/null", "100", 0, "")]
+    {
+        let line = format!(
+            "exec {} evolve photo.png -q -n 60 --births {births} -o - {redirection}",
+            env!("CARGO_BIN_EXE_smalti")
+        );
+        let mut command = std::process::Command::new("sh");
+        command.args(["-c", &line]).current_dir(workshop.path("")).env("SMALTI_DEVICE", "cpu");
+        let output = command.output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{stderr}");
+        assert!(stderr.starts_with(message) && stderr.lines().count() == usize::from(code == 1), "{stderr:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_row_that_cannot_be_printed_is_a_failure_with_a_sentence() {
+    let workshop = Workshop::new();
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let mut command = workshop.command("evolve photo.png -n 60 --births 100 -q --json -o a.png");
+    let output = command.stdout(full).output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.starts_with("smalti: stdout: cannot be written") && stderr.lines().count() == 1, "{stderr:?}");
 }
 
 #[test]
