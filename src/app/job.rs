@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::memory;
 use super::options::EvolveOptions;
 use crate::archive;
 use crate::error::{Error, Result};
@@ -41,6 +42,7 @@ impl Job {
         let target = Target::new(photo.width_px, photo.height_px, photo.pixels)?;
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
+            memory::check(memory::list_bytes(population))?;
         }
         let fly_count = init.as_ref().map(|population| population.flies.len()).or(options.fly_count);
         Ok(Self {
