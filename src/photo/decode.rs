@@ -66,7 +66,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     let (original_width_px, original_height_px) = upright.dimensions();
     let sha256 = sha256_hex(&bytes);
     drop(bytes);
-    let photo = resize::fit(upright, options.long_side_px);
+    let photo = resize::fit(&upright, options.long_side_px);
     Ok(Loaded { photo, original_width_px, original_height_px, sha256, warnings })
 }
 

@@ -15,7 +15,7 @@ use super::Photo;
 const SUPPORT: f64 = 3.0;
 
 /// The picture with its longer side reduced to `long_side_px`; the same picture if it is not longer than that.
-pub(super) fn fit(image: RgbImage, long_side_px: Option<u32>) -> Photo {
+pub(super) fn fit(image: &RgbImage, long_side_px: Option<u32>) -> Photo {
     let (width_px, height_px) = fitted_size(image.width(), image.height(), long_side_px);
     // A view, since a copy of the largest picture that is read takes most of a GiB.
     let (source, _) = image.as_raw().as_chunks::<3>();
