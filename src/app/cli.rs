@@ -124,7 +124,7 @@ pub(super) struct EvolveArgs {
     /// Further runs, each from the best population so far, 0 to 1,000,000
     #[arg(long, value_name = "R", value_parser = values::count, default_value = "0", help_heading = "Evolution")]
     pub restarts: u64,
-    /// Factor of all mutation steps at each restart, above 0 up to 1
+    /// Factor of all mutation steps at each restart, 0.00001 to 1
     #[arg(long, value_name = "F", default_value_t = 1.0, help_heading = "Evolution")]
     pub cool: f64,
     /// What to do when no bad tile is found: take the worse of two, begin the next run, or stop

@@ -7,11 +7,10 @@ use crate::error::{Error, Result};
 use crate::gpu::GpuEvaluator;
 use crate::model::{Evaluator, Scene};
 use crate::vk::{
-    Choice, Device, DeviceInfo, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, ValidationLog,
-    choose,
+    Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, ValidationLog, choose,
 };
 
-/// The device that was chosen, not yet opened.
+/// The device that was chosen, ready for an evaluator.
 pub(super) enum Selected {
     /// The CPU twin.
     Cpu {
@@ -19,7 +18,7 @@ pub(super) enum Selected {
         reason: Option<String>,
     },
     /// A Vulkan device.
-    Vulkan { instance: Arc<Instance>, info: Box<DeviceInfo> },
+    Vulkan { device: Arc<Device>, validation_log: Arc<ValidationLog> },
 }
 
 /// An evaluator that is ready to work.
@@ -29,31 +28,46 @@ pub(super) struct Opened {
     pub validation_log: Option<Arc<ValidationLog>>,
 }
 
-/// Finds the device that was asked for.
+/// Finds and opens the device that was asked for. Who leaves the choice to `auto` gets the CPU twin wherever Vulkan
+/// fails, since nobody asked for Vulkan; `--validate` asks for it.
 ///
 /// # Errors
-/// [`Error::NoSuitableDevice`] if there is none, or if Vulkan or its validation layer is asked for and missing.
+/// [`Error::NoSuitableDevice`] if there is none, or if Vulkan or its validation layer is asked for and missing;
+/// [`Error::Vulkan`] if a device that was asked for cannot be opened.
 pub(super) fn select(request: &DeviceRequest, validation: Validation) -> Result<Selected> {
     if *request == DeviceRequest::Cpu {
         return Ok(Selected::Cpu { reason: None });
     }
-    let listed = Instance::create(InstanceOptions { validation })
-        .and_then(|instance| instance.physical_devices().map(|devices| (instance, devices)));
-    let (instance, devices) = match listed {
-        Ok(listed) => listed,
-        Err(Error::NoSuitableDevice { .. }) if *request == DeviceRequest::Auto && validation == Validation::Off => {
-            let reason = "there is no Vulkan on this machine (`smalti devices` says what to install)".to_owned();
-            return Ok(Selected::Cpu { reason: Some(reason) });
-        }
-        Err(error) => return Err(error),
+    let is_asked_for = *request != DeviceRequest::Auto || validation == Validation::On;
+    unless_nobody_asked(find_and_open(request, validation), is_asked_for)
+}
+
+fn find_and_open(request: &DeviceRequest, validation: Validation) -> Result<Selected> {
+    let instance = Instance::create(InstanceOptions { validation })?;
+    let devices = instance.physical_devices()?;
+    let index = match choose(request, &devices)? {
+        Choice::Cpu { reason } => return Ok(Selected::Cpu { reason: Some(reason) }),
+        Choice::Vulkan(index) => index,
     };
-    match choose(request, &devices)? {
-        Choice::Cpu { reason } => Ok(Selected::Cpu { reason: Some(reason) }),
-        Choice::Vulkan(index) => {
-            let info = devices.into_iter().find(|info| info.index == index).map(Box::new);
-            let info = info.ok_or_else(|| Error::Internal(format!("device {index} was chosen and is not listed")))?;
-            Ok(Selected::Vulkan { instance, info })
-        }
+    let info = devices.iter().find(|info| info.index == index);
+    let info = info.ok_or_else(|| Error::Internal(format!("device {index} was chosen and is not listed")))?;
+    let device = Device::create(&instance, info, &DeviceOptions::default())?;
+    Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()) })
+}
+
+/// The CPU twin in place of a Vulkan that failed and that nobody asked for.
+fn unless_nobody_asked(found: Result<Selected>, is_asked_for: bool) -> Result<Selected> {
+    match found {
+        Err(error) if !is_asked_for => Ok(Selected::Cpu { reason: Some(why_no_vulkan(&error)) }),
+        found => found,
+    }
+}
+
+/// Why the CPU twin stands in for Vulkan, to follow the word "since".
+pub(super) fn why_no_vulkan(error: &Error) -> String {
+    match error {
+        Error::NoSuitableDevice { why } => why.clone(),
+        other => other.to_string(),
     }
 }
 
@@ -62,22 +76,43 @@ impl Selected {
     pub(super) fn label(&self) -> &str {
         match self {
             Self::Cpu { .. } => "CPU",
-            Self::Vulkan { info, .. } => &info.name,
+            Self::Vulkan { device, .. } => &device.info().name,
         }
     }
 
     /// An evaluator with one lane per scene on this device.
     ///
     /// # Errors
-    /// If the device cannot be opened or has no room for the scenes.
+    /// If the device has no room for the scenes.
     pub(super) fn open(self, scenes: Vec<Scene>) -> Result<Opened> {
         match self {
             Self::Cpu { .. } => Ok(Opened { evaluator: Box::new(CpuEvaluator::new(scenes)), validation_log: None }),
-            Self::Vulkan { instance, info } => {
-                let device = Device::create(&instance, &info, &DeviceOptions::default())?;
-                let validation_log = Some(Arc::clone(instance.validation_log()));
-                Ok(Opened { evaluator: Box::new(GpuEvaluator::create(&device, scenes)?), validation_log })
+            Self::Vulkan { device, validation_log } => {
+                let evaluator = Box::new(GpuEvaluator::create(&device, scenes)?);
+                Ok(Opened { evaluator, validation_log: Some(validation_log) })
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vulkan_that_fails_is_an_error_only_for_those_who_asked_for_it() {
+        let failures = || {
+            let broken = Error::Vulkan { call: "vkCreateInstance".to_owned(), reason: "ended".to_owned() };
+            [broken, Error::NoSuitableDevice { why: "vkCreateInstance ended".to_owned() }]
+        };
+        for error in failures() {
+            match unless_nobody_asked(Err(error), false) {
+                Ok(Selected::Cpu { reason: Some(reason) }) => assert!(reason.contains("vkCreateInstance"), "{reason}"),
+                _ => panic!("the CPU twin was left out"),
+            }
+        }
+        for error in failures() {
+            assert!(unless_nobody_asked(Err(error), true).is_err());
         }
     }
 }

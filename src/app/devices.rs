@@ -6,7 +6,7 @@ use indicatif::{BinaryBytes, HumanCount};
 use serde_json::json;
 
 use super::cli::DevicesArgs;
-use super::report;
+use super::{device, report};
 use crate::error::Result;
 use crate::vk::{Choice, DeviceInfo, DeviceKind, DeviceLimits, DeviceRequest, Instance, InstanceOptions, choose};
 
@@ -22,8 +22,15 @@ pub(super) fn list(args: &DevicesArgs) -> ExitCode {
 }
 
 fn print_list(args: &DevicesArgs) -> Result<()> {
-    let devices = Instance::create(InstanceOptions::default())?.physical_devices()?;
-    let automatic = choose(&DeviceRequest::Auto, &devices)?;
+    let listed = Instance::create(InstanceOptions::default()).and_then(|instance| instance.physical_devices());
+    let (devices, automatic) = match listed {
+        Ok(devices) => {
+            let automatic = choose(&DeviceRequest::Auto, &devices)?;
+            (devices, automatic)
+        }
+        // No device is an answer, since there is always the CPU twin.
+        Err(error) => (Vec::new(), Choice::Cpu { reason: device::why_no_vulkan(&error) }),
+    };
     if args.json {
         let automatic = match &automatic {
             Choice::Cpu { reason } => json!({ "device": "cpu", "reason": reason }),

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::memory;
 use super::options::EvolveOptions;
 use crate::archive;
 use crate::error::{Error, Result};
@@ -30,7 +31,8 @@ impl Job {
     /// Reads the picture and the population.
     ///
     /// # Errors
-    /// [`Error::Input`] if one of them cannot be used, or they do not fit together.
+    /// [`Error::Input`] if one of them cannot be used, or they do not fit together; [`Error::TooLarge`] if the block
+    /// lists of the population do not fit into memory.
     pub(super) fn load(options: &EvolveOptions) -> Result<Self> {
         let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
         let of_init = init.as_ref().map(|population| population.background);
@@ -41,6 +43,9 @@ impl Job {
         let target = Target::new(photo.width_px, photo.height_px, photo.pixels)?;
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
+            let pixel_count = u64::from(target.width_px()) * u64::from(target.height_px());
+            let usual_bytes = memory::estimate_bytes(pixel_count, population.flies.len(), pixel_count);
+            memory::check(usual_bytes.saturating_add(memory::list_bytes(population)))?;
         }
         let fly_count = init.as_ref().map(|population| population.flies.len()).or(options.fly_count);
         Ok(Self {

@@ -1,6 +1,7 @@
 //! Whether the work fits into memory, found out before it begins.
 
 use crate::error::{Error, Result};
+use crate::model::{Canvas, Population, Tile};
 
 // The first two are about twice what the CPU twin takes for a random population of 50,000 flies at 4096x4096, and of
 // 1,000,000 at 512x512, since lists grow while tiles gather.
@@ -10,6 +11,20 @@ const BYTES_PER_PIXEL: u64 = 40;
 const BYTES_PER_FLY: u64 = 512;
 /// Bytes per pixel of the written picture: the mosaic, the encoder's copy, and the encoded file.
 const BYTES_PER_OUTPUT_PIXEL: u64 = 10;
+
+/// Bytes per block that a tile touches: an entry of 8 in a list that grows by doubling.
+const BYTES_PER_ENTRY: u64 = 16;
+/// Least side in px of a block.
+const BLOCK_SIDE_PX: i32 = 8;
+
+/// About how many bytes the block lists of a population take. The estimate per fly knows tiles of the usual size only,
+/// and a population from a file may hold others.
+pub(super) fn list_bytes(population: &Population) -> u64 {
+    let canvas = Canvas::evaluation(population.width_px, population.height_px);
+    let blocks = |first: i32, last: i32| (last / BLOCK_SIDE_PX - first / BLOCK_SIDE_PX + 1) as u64;
+    let tiles = population.flies.iter().map(|fly| Tile::bake(fly, &canvas)).filter(|tile| tile.x0 <= tile.x1);
+    tiles.map(|tile| blocks(tile.x0, tile.x1) * blocks(tile.y0, tile.y1)).sum::<u64>() * BYTES_PER_ENTRY
+}
 
 /// About how many bytes an evolution needs.
 pub(super) fn estimate_bytes(pixel_count: u64, fly_count: usize, output_pixel_count: u64) -> u64 {
@@ -47,6 +62,8 @@ fn available_bytes(meminfo: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::fly::Genes;
+    use crate::model::{Fly, MaskSet};
 
     #[test]
     fn the_free_memory_is_found_in_what_linux_tells() {
@@ -61,6 +78,16 @@ mod tests {
         assert!(check_against(1 << 60, None).is_ok());
         let refusal = check_against(3 << 30, Some(1 << 30)).expect_err("there is not enough").to_string();
         assert!(refusal.contains("3072 MiB") && refusal.contains("1024 MiB"), "{refusal}");
+    }
+
+    #[test]
+    fn flies_as_large_as_the_picture_are_counted_in_every_block() {
+        let genes =
+            Genes { x: 1024.0, y: 1024.0, z: 0.0, r: 0.0, g: 0.0, b: 0.0, w: 4096.0, h: 4096.0, angle_deg: 0.0 };
+        let flies = vec![Fly::from_genes(&genes, 0); 3000];
+        let population =
+            Population { width_px: 2048, height_px: 2048, background: [0; 3], masks: MaskSet::default(), flies };
+        assert_eq!(list_bytes(&population), 3000 * 256 * 256 * 16);
     }
 
     #[test]

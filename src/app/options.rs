@@ -14,6 +14,8 @@ use crate::vk::{DeviceRequest, Validation};
 
 /// Most restarts of one evolution.
 const RESTARTS_MAX: u64 = 1_000_000;
+/// Least factor of the mutation steps: it is kept in 65,536ths and must not become 0.
+const COOL_MIN: f64 = 0.00001;
 /// Most CPU threads.
 const THREADS_MAX: u64 = 1_024;
 
@@ -75,7 +77,7 @@ impl EvolveOptions {
         let side_px = |flag, px| in_range(flag, px, sides).map(|px| px as u32);
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
         let threads = args.threads.map(|count| in_range("--threads", count, (1, THREADS_MAX))).transpose()?;
-        let device: DeviceRequest = args.device.parse()?;
+        let device = device(&args.device)?;
         if args.validate && device == DeviceRequest::Cpu {
             return Err(Error::Usage(
                 "--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned(),
@@ -112,14 +114,27 @@ impl EvolveOptions {
     }
 }
 
+/// The device that was asked for; no word at all, as in an empty SMALTI_DEVICE, asks for none.
+fn device(text: &str) -> Result<DeviceRequest> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Ok(DeviceRequest::Auto);
+    }
+    if text.bytes().all(|byte| byte.is_ascii_digit()) && text.parse::<usize>().is_err() {
+        let why = format!("--device {text}: no machine has as many; see smalti devices for the numbers, or use auto");
+        return Err(Error::NoSuitableDevice { why });
+    }
+    text.parse()
+}
+
 fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
     let SchemeName::Paper = args.scheme;
     let batch_births = in_range("--batch-births", args.batch_births, (1, FLY_COUNT_MAX as u64))?;
     let restarts = in_range("--restarts", args.restarts, (0, RESTARTS_MAX))?;
     let patience = args.patience.map(|births| in_range("--patience", births, (1, u64::MAX))).transpose()?;
     let cool_q16 = (args.cool * 65_536.0).round();
-    if !(1.0..=65_536.0).contains(&cool_q16) {
-        return Err(Error::Usage(format!("--cool {}: must be above 0 and at most 1", args.cool)));
+    if !(COOL_MIN..=1.0).contains(&args.cool) {
+        return Err(Error::Usage(format!("--cool {}: must be {COOL_MIN} to 1", args.cool)));
     }
     if cool_q16 < 65_536.0 && restarts == 0 {
         return Err(Error::Usage("--cool changes only the runs after the first; add --restarts".to_owned()));

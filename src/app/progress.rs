@@ -98,41 +98,45 @@ impl Standing {
         self.births as f64 / self.elapsed.as_secs_f64().max(1e-9)
     }
 
-    /// Seconds left: until all births are made, or the time is up.
-    fn eta_s(&self) -> f64 {
-        let by_births = (self.births_planned - self.births.min(self.births_planned)) as f64 / self.births_per_s();
+    /// Seconds left: until all births are made, or the time is up. Unknown before the first birth without a time limit.
+    fn eta_s(&self) -> Option<f64> {
+        let births_left = self.births_planned.saturating_sub(self.births);
+        let is_known = births_left == 0 || self.births > 0;
+        let by_births = is_known.then(|| births_left as f64 / self.births_per_s().max(1e-9));
         let by_time = self.time_limit.map(|limit| limit.saturating_sub(self.elapsed).as_secs_f64());
-        by_time.map_or(by_births, |left| left.min(by_births))
+        by_births.into_iter().chain(by_time).reduce(f64::min)
     }
 
     /// How much is done, 0 to 1.
     fn share(&self) -> f64 {
         let elapsed_s = self.elapsed.as_secs_f64();
-        elapsed_s / (elapsed_s + self.eta_s()).max(1e-9)
+        self.eta_s().map_or(0.0, |eta_s| elapsed_s / (elapsed_s + eta_s).max(1e-9))
     }
 
     fn line(&self) -> String {
+        let left = self.eta_s().map(|eta_s| format!(", {} left", short_time(eta_s))).unwrap_or_default();
         format!(
-            "{}/{} births, SAE {}, {} births/s, {} left",
+            "{}/{} births, SAE {}, {} births/s{left}",
             HumanCount(self.births),
             HumanCount(self.births_planned),
             HumanCount(self.sae),
-            HumanCount(self.births_per_s() as u64),
-            short_time(self.eta_s())
+            HumanCount(self.births_per_s() as u64)
         )
     }
 
     fn json_line(&self) -> String {
         let rounded = |value: f64| (value * 10.0).round() / 10.0;
-        json!({
+        let mut line = json!({
             "births": self.births,
             "births_planned": self.births_planned,
             "sae": self.sae,
             "births_per_s": rounded(self.births_per_s()),
             "elapsed_s": rounded(self.elapsed.as_secs_f64()),
-            "eta_s": rounded(self.eta_s()),
-        })
-        .to_string()
+        });
+        if let Some(eta_s) = self.eta_s() {
+            line["eta_s"] = rounded(eta_s).into();
+        }
+        line.to_string()
     }
 }
 
@@ -169,10 +173,18 @@ mod tests {
     #[test]
     fn the_time_left_ends_with_the_time_limit() {
         let limited = Standing { time_limit: Some(Duration::from_secs(15)), ..standing() };
-        assert_eq!(limited.eta_s(), 5.0);
-        assert_eq!(short_time(standing().eta_s()), "30s");
+        assert_eq!(limited.eta_s(), Some(5.0));
+        assert_eq!(standing().eta_s().map(short_time).as_deref(), Some("30s"));
         assert_eq!(short_time(129.5), "2m10s");
         assert_eq!(short_time(11_100.0), "3h05m");
+    }
+
+    #[test]
+    fn before_the_first_birth_the_time_left_is_left_out() {
+        let idle = Standing { births: 0, ..standing() };
+        assert_eq!(idle.line(), "0/4,000 births, SAE 1,234,567, 0 births/s");
+        assert!(!idle.json_line().contains("eta_s"), "{}", idle.json_line());
+        assert_eq!(Standing { time_limit: Some(Duration::from_secs(15)), ..idle }.eta_s(), Some(5.0));
     }
 
     #[test]

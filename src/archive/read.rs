@@ -1,7 +1,7 @@
 //! From a `.npz` file to a population, trusting nothing in it.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 
 use npyz::{Deserialize, NpyFile, Order};
@@ -16,6 +16,7 @@ use crate::model::mask::{MASK_LAYERS_MAX, MASK_SIDE, Texel};
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Fly, Mask, MaskSet, Population};
+use crate::photo;
 
 /// Most bytes of a column: eight per fly and an array header.
 const COLUMN_BYTES_MAX: u64 = 8 * FLY_COUNT_MAX as u64 + ARRAY_HEADER_BYTES_MAX as u64 + 16;
@@ -86,10 +87,12 @@ struct Members {
 
 impl Members {
     fn open(path: &Path) -> Result<Self, String> {
-        let file = File::open(path).map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => "there is no such file; check its name".to_owned(),
-            _ => format!("cannot be read ({error})"),
-        })?;
+        let unreadable = |error: io::Error| photo::why_unreadable(&error);
+        let file = File::open(path).map_err(unreadable)?;
+        // Opening a folder succeeds, and reading it fails in words of the zip reader.
+        if file.metadata().map_err(unreadable)?.is_dir() {
+            return Err(unreadable(io::ErrorKind::IsADirectory.into()));
+        }
         let zip = ZipArchive::new(BufReader::new(file))
             .map_err(|error| format!("is not a population: no readable .npz file ({error})"))?;
         Ok(Self { zip })
@@ -229,6 +232,6 @@ fn column_of<T: Deserialize>(name: &str, bytes: &[u8], type_name: &str) -> Resul
     let wrong_type = || format!("its column `{name}` is of type {descr} instead of {type_name}");
     let values = array.data::<T>().map_err(|_| wrong_type())?;
     values
-        .collect::<std::io::Result<Vec<T>>>()
+        .collect::<io::Result<Vec<T>>>()
         .map_err(|error| format!("its column `{name}` is broken or cut short ({error})"))
 }

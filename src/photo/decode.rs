@@ -64,8 +64,10 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     let upright =
         decode(&bytes, format, options.background, &mut warnings).map_err(|reason| Error::input(path, reason))?;
     let (original_width_px, original_height_px) = upright.dimensions();
-    let photo = resize::fit(&photo_of(&upright), options.long_side_px);
-    Ok(Loaded { photo, original_width_px, original_height_px, sha256: sha256_hex(&bytes), warnings })
+    let sha256 = sha256_hex(&bytes);
+    drop(bytes);
+    let photo = resize::fit(&upright, options.long_side_px);
+    Ok(Loaded { photo, original_width_px, original_height_px, sha256, warnings })
 }
 
 /// The bytes of the file at `path`, once its first bytes have shown that it is a picture.
@@ -88,7 +90,7 @@ fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
 }
 
 /// Why opening or reading an input failed, and what to do.
-pub(super) fn why_unreadable(error: &io::Error) -> String {
+pub(crate) fn why_unreadable(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "there is no such file; check its name".to_owned(),
         io::ErrorKind::IsADirectory => "is a folder; name a file in it".to_owned(),
@@ -157,11 +159,6 @@ fn why_undecodable(format: ImageFormat, error: ImageError) -> String {
 
 fn broken_sentence(format: ImageFormat, detail: &str) -> String {
     format!("the {format:?} data is broken or cut short ({detail}); get the file again or save it anew")
-}
-
-fn photo_of(image: &RgbImage) -> Photo {
-    let (pixels, _) = image.as_raw().as_chunks::<3>();
-    Photo { width_px: image.width(), height_px: image.height(), pixels: pixels.to_vec() }
 }
 
 fn sha256_hex(bytes: &[u8]) -> String {

@@ -12,6 +12,7 @@ mod jpeg_segments;
 mod metadata;
 mod resize;
 
+pub(crate) use decode::why_unreadable;
 pub use decode::{Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
 pub use encode::{Format, encode, encode_jpeg, encode_png};
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};

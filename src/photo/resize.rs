@@ -5,29 +5,59 @@
 
 use std::f64::consts::PI;
 
+use image::RgbImage;
 use resize::px::RGB;
-use resize::{Filter, Pixel, Resizer, Type};
+use resize::{Filter, Pixel, PixelFormat, Resizer, Type};
 
 use super::Photo;
 
 /// Pixels of the source, at scale 1, that the filter reaches to each side.
 const SUPPORT: f64 = 3.0;
 
-/// The photo with its longer side reduced to `long_side_px`; the same photo if it is not longer than that.
-pub(super) fn fit(photo: &Photo, long_side_px: Option<u32>) -> Photo {
-    let (width_px, height_px) = fitted_size(photo.width_px, photo.height_px, long_side_px);
-    if (width_px, height_px) == (photo.width_px, photo.height_px) {
-        return photo.clone();
+/// The picture with its longer side reduced to `long_side_px`; the same picture if it is not longer than that.
+pub(super) fn fit(image: &RgbImage, long_side_px: Option<u32>) -> Photo {
+    let (width_px, height_px) = fitted_size(image.width(), image.height(), long_side_px);
+    // A view, since a copy of the largest picture that is read takes most of a GiB.
+    let (source, _) = image.as_raw().as_chunks::<3>();
+    if (width_px, height_px) == image.dimensions() {
+        return Photo { width_px, height_px, pixels: source.to_vec() };
     }
     let filter = Filter::new(Box::new(|x| lanczos3(f64::from(x)) as f32), SUPPORT as f32);
-    let [width, height] = [photo.width_px, photo.height_px].map(|side_px| side_px as usize);
-    let (fitted_width, fitted_height) = (width_px as usize, height_px as usize);
-    let source: Vec<RGB<u8>> = photo.pixels.iter().map(|&[r, g, b]| RGB { r, g, b }).collect();
-    let mut fitted = vec![RGB { r: 0_u8, g: 0, b: 0 }; fitted_width * fitted_height];
-    Resizer::new(width, height, fitted_width, fitted_height, Pixel::RGB8, Type::Custom(filter))
-        .and_then(|mut resizer| resizer.resize(&source, &mut fitted))
+    let [width, height, fitted_width, fitted_height] =
+        [image.width(), image.height(), width_px, height_px].map(|side_px| side_px as usize);
+    let mut pixels = vec![[0; 3]; fitted_width * fitted_height];
+    Resizer::new(width, height, fitted_width, fitted_height, Channels, Type::Custom(filter))
+        .and_then(|mut resizer| resizer.resize(source, &mut pixels))
         .expect("both pictures have as many pixels as their sizes say");
-    Photo { width_px, height_px, pixels: fitted.into_iter().map(|RGB { r, g, b }| [r, g, b]).collect() }
+    Photo { width_px, height_px, pixels }
+}
+
+/// Pixels as arrays; the arithmetic is that of [`Pixel::RGB8`].
+struct Channels;
+
+impl PixelFormat for Channels {
+    type InputPixel = [u8; 3];
+    type OutputPixel = [u8; 3];
+    type Accumulator = RGB<f32>;
+
+    fn new() -> RGB<f32> {
+        RGB { r: 0.0, g: 0.0, b: 0.0 }
+    }
+
+    fn add(&self, sum: &mut RGB<f32>, [r, g, b]: [u8; 3], weight: f32) {
+        Pixel::RGB8.add(sum, RGB { r, g, b }, weight);
+    }
+
+    fn add_acc(sum: &mut RGB<f32>, part: RGB<f32>, weight: f32) {
+        sum.r += part.r * weight;
+        sum.g += part.g * weight;
+        sum.b += part.b * weight;
+    }
+
+    fn into_pixel(&self, sum: RGB<f32>) -> [u8; 3] {
+        let RGB { r, g, b } = Pixel::RGB8.into_pixel(sum);
+        [r, g, b]
+    }
 }
 
 /// The size in px that fits: the longer side is `long_side_px`, the other is rounded half up, and none is below 1 px.

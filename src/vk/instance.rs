@@ -67,7 +67,11 @@ impl Instance {
     /// [`Error::NoSuitableDevice`] if a driver is installed that finds no hardware.
     pub fn physical_devices(&self) -> Result<Vec<DeviceInfo>> {
         let handles = self.physical_handles()?;
-        handles.iter().enumerate().map(|(index, &handle)| physical::describe(&self.raw, handle, index)).collect()
+        Ok(handles
+            .iter()
+            .enumerate()
+            .map(|(index, &handle)| physical::describe_for_list(&self.raw, handle, index))
+            .collect())
     }
 
     /// What the validation layer has said; empty without [`Validation::On`]. The log may outlive the instance.

@@ -107,11 +107,27 @@ const STORAGE_BUFFERS: u32 = 10;
 
 /// Asks the driver everything that [`DeviceInfo`] holds.
 pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> Result<DeviceInfo> {
+    let mut info = identity(instance, handle, index);
+    add_details(instance, handle, &mut info)?;
+    Ok(info)
+}
+
+/// As [`describe`], and what the driver fails to tell is missing: a broken one must not hide the devices of the others.
+pub(super) fn describe_for_list(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> DeviceInfo {
+    let mut info = identity(instance, handle, index);
+    if let Err(error) = add_details(instance, handle, &mut info) {
+        info.missing.push(format!("a working driver ({error})"));
+    }
+    info
+}
+
+/// What every driver tells without an error.
+fn identity(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> DeviceInfo {
     // SAFETY: V1.
     let properties = unsafe { instance.get_physical_device_properties(handle) };
     let family = queue_family(instance, handle);
     let version = properties.api_version;
-    let mut info = DeviceInfo {
+    DeviceInfo {
         index,
         name: text(properties.device_name_as_c_str()),
         kind: kind_of(properties.device_type),
@@ -133,22 +149,26 @@ pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, ind
         subgroup_operations: Vec::new(),
         limits: limits_of(&properties.limits, family.map_or(0, |(_, timestamp_bits)| timestamp_bits)),
         missing: Vec::new(),
-    };
-    if version < vk::API_VERSION_1_3 {
+    }
+}
+
+fn add_details(instance: &ash::Instance, handle: vk::PhysicalDevice, info: &mut DeviceInfo) -> Result<()> {
+    // SAFETY: V1.
+    if unsafe { instance.get_physical_device_properties(handle) }.api_version < vk::API_VERSION_1_3 {
         // The questions below exist only since Vulkan 1.3; asking an older device would be invalid.
         info.missing.push(format!("Vulkan 1.3 (the driver offers {})", info.api_version));
-        return Ok(info);
+        return Ok(());
     }
-    add_modern_properties(instance, handle, &mut info)?;
+    add_modern_properties(instance, handle, info)?;
     add_missing_features(instance, handle, &mut info.missing);
     add_missing_formats(instance, handle, &mut info.missing);
     if info.limits.storage_buffers_per_stage < STORAGE_BUFFERS {
         info.missing.push(format!("{STORAGE_BUFFERS} storage buffers per shader stage"));
     }
-    if family.is_none() {
+    if queue_family(instance, handle).is_none() {
         info.missing.push("a queue for graphics and compute".to_owned());
     }
-    Ok(info)
+    Ok(())
 }
 
 /// The first queue family for graphics and compute, and the bits of its timestamps.

@@ -54,10 +54,14 @@ impl Recorder {
     }
 }
 
-/// The error of a failed submission; a lost device gets the sentence that names the last pass.
+/// The error of a failed submission: a lost device gets the sentence that names the last pass, full memory gets advice.
 fn submission_failed(call: &str, result: vk::Result, last_pass: &str) -> Error {
     match result {
         vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { last_pass: last_pass.to_owned() },
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => refused(
+            format!("{call} after pass {last_pass}"),
+            "no memory is left; use a smaller --size or fewer --tiles, or --device cpu",
+        ),
         other => call_failed(format!("{call} after pass {last_pass}"), other),
     }
 }
@@ -135,7 +139,15 @@ mod tests {
     fn a_lost_device_is_told_with_the_last_pass() {
         let lost = submission_failed("vkQueueSubmit2", vk::Result::ERROR_DEVICE_LOST, "evaluate");
         assert!(matches!(&lost, Error::DeviceLost { last_pass } if last_pass == "evaluate"));
-        let other = submission_failed("vkQueueSubmit2", vk::Result::ERROR_OUT_OF_HOST_MEMORY, "evaluate");
+        let other = submission_failed("vkQueueSubmit2", vk::Result::ERROR_UNKNOWN, "evaluate");
         assert!(other.to_string().contains("vkQueueSubmit2 after pass evaluate"), "{other}");
+    }
+
+    #[test]
+    fn full_memory_is_told_with_the_last_pass_and_advice() {
+        for result in [vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_OUT_OF_HOST_MEMORY] {
+            let full = submission_failed("vkWaitForFences", result, "evaluate").to_string();
+            assert!(full.contains("pass evaluate") && full.contains("use a smaller --size"), "{full}");
+        }
     }
 }

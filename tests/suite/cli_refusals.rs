@@ -67,6 +67,7 @@ fn values_out_of_range_are_refused_with_their_flag() {
         ("-n 60 --batch-births 61", "--batch-births 61"),
         ("--cool 0.5", "--restarts"),
         ("--cool 0 --restarts 1", "--cool 0"),
+        ("--cool 0.000000001 --restarts 1", "must be 0.00001 to 1"),
         ("--cool 1.5 --restarts 1", "--cool 1.5"),
         ("--cool NaN --restarts 1", "--cool NaN"),
         ("--patience 0", "--patience 0"),
@@ -87,9 +88,19 @@ fn values_out_of_range_are_refused_with_their_flag() {
 #[test]
 fn a_device_that_is_not_there_is_no_suitable_device() {
     let workshop = Workshop::new();
-    for device in ["name:no-such-gpu", "99", "uuid:00000000000000000000000000000000", "pci:ffff:ff:1f.7"] {
+    for device in
+        ["name:no-such-gpu", "99", "99999999999999999999", "uuid:00000000000000000000000000000000", "pci:ffff:ff:1f.7"]
+    {
         refused(&workshop, &format!("evolve photo.png -o out.png --device {device}"), 4, device);
     }
+}
+
+#[test]
+fn an_empty_variable_asks_for_no_device() {
+    let workshop = Workshop::new();
+    let mut command = workshop.command("evolve photo.png -o out.png --dry-run");
+    let output = command.env("SMALTI_DEVICE", "").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]
@@ -146,6 +157,8 @@ fn populations_that_do_not_fit_are_refused() {
     refused(&workshop, "evolve photo.png -o a.png --init photo.png", 2, "photo.png");
     refused(&workshop, "evolve photo.png -o a.png --init missing.npz", 2, "missing.npz");
     refused(&workshop, "evolve photo.png -o a.png --init cut.npz", 2, "cut.npz");
+    std::fs::create_dir(workshop.path("folder")).unwrap();
+    refused(&workshop, "evolve photo.png -o a.png --init folder", 2, "folder: is a folder");
 }
 
 #[test]

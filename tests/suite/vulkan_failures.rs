@@ -12,6 +12,7 @@ use smalti::{Error, Result};
 
 use crate::canary;
 use crate::vulkan::{NEIGHBOURS, neighbours, on_both_paths, read_all, storage, words};
+use crate::workshop::Workshop;
 
 #[test]
 fn a_mistake_in_a_pass_is_returned_by_the_submission_and_the_recorder_goes_on() {
@@ -189,6 +190,26 @@ fn output_of_child(variable: &str, value: &std::path::Path) -> String {
         .output()
         .expect("the test binary runs");
     String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn without_vulkan_auto_takes_the_cpu_and_the_list_of_devices_says_so() {
+    let workshop = Workshop::new();
+    let nowhere = workshop.path("missing");
+    let run = |line: &str| workshop.command(line).env("VK_DRIVER_FILES", &nowhere).output().expect("it starts");
+    let evolved = run("evolve photo.png -o out.png -n 60 --births 10 --device auto");
+    let note = String::from_utf8_lossy(&evolved.stderr);
+    assert!(evolved.status.success() && note.contains("since no Vulkan driver is installed"), "{note}");
+    assert_eq!(run("evolve photo.png -o new.png --device vulkan").status.code(), Some(4));
+
+    let listed = run("devices --json");
+    let list: serde_json::Value = serde_json::from_slice(&listed.stdout).expect("it is JSON");
+    assert_eq!([listed.status.code(), list["devices"].as_array().map(|list| list.len() as i32)], [Some(0); 2]);
+    assert_eq!(list["auto"]["device"], "cpu");
+    assert!(list["auto"]["reason"].as_str().is_some_and(|reason| reason.contains("mesa-vulkan-drivers")), "{list}");
+    let table = run("devices");
+    assert!(table.status.success());
+    assert!(String::from_utf8_lossy(&table.stdout).starts_with("--device auto takes the CPU twin, since no Vulkan"));
 }
 
 #[test]
