@@ -46,6 +46,10 @@ fn find_and_open(request: &DeviceRequest, validation: Validation) -> Result<Sele
     let instance = Instance::create(InstanceOptions { validation })?;
     let devices = instance.physical_devices()?;
     let index = match choose(request, &devices)? {
+        Choice::Cpu { reason } if validation == Validation::On => {
+            let why = format!("--validate needs a Vulkan device, and {reason}; name one, such as --device vulkan");
+            return Err(Error::NoSuitableDevice { why });
+        }
         Choice::Cpu { reason } => return Ok(Selected::Cpu { reason: Some(reason) }),
         Choice::Vulkan(index) => index,
     };

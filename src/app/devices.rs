@@ -40,7 +40,7 @@ fn print_list(args: &DevicesArgs) -> Result<()> {
     }
     let mut text: String = devices.iter().map(block).collect();
     text.push_str(&match automatic {
-        Choice::Cpu { reason } => format!("--device auto takes the CPU twin, since {reason}\n"),
+        Choice::Cpu { reason } => format!("--device auto takes the CPU, since {reason}\n"),
         Choice::Vulkan(index) => format!("--device auto takes device {index}\n"),
     });
     report::write_stdout(text.as_bytes())

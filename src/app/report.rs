@@ -176,7 +176,11 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
         say(&format!("SHA-256 of the input {}", job.input_sha256));
         say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
     }
-    let partial = if row.status == Status::Partial { " (partial: run the same command again)" } else { "" };
+    let partial = if row.status == Status::Partial {
+        " (partial; the same command starts over, and --init goes on from a .npz)"
+    } else {
+        ""
+    };
     let written = if row.output.is_empty() { "nothing".to_owned() } else { row.output.join(", ") };
     say(&format!("wrote {written}{partial}"));
 }

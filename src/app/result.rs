@@ -15,8 +15,10 @@ use crate::photo::{self, Photo};
 
 /// Quality of JPEG outputs, 1 to 100.
 const JPEG_QUALITY: u8 = 92;
-/// Most samples along each side of a pixel of an enlarged picture.
-const SUPERSAMPLING_MAX: u32 = 4;
+/// Samples along each side of a pixel of an enlarged picture.
+const SUPERSAMPLING: u32 = 4;
+/// Most samples along each side of a pixel of a reduced picture.
+const SUPERSAMPLING_MAX: u32 = 16;
 
 /// What an evolution led to.
 #[derive(Debug)]
@@ -65,7 +67,7 @@ pub(super) fn draw(
             if options.verbosity > Verbosity::Quiet {
                 report::say(&format!("drawing {}x{} px", canvas.width_px, canvas.height_px));
             }
-            Some(evaluator.draw(&population, &canvas, supersampling(long))?)
+            Some(evaluator.draw(&population, &canvas, supersampling(long, width_px.max(height_px)))?)
         }
         _ => None,
     };
@@ -77,9 +79,11 @@ pub(super) fn resized_px(options: &EvolveOptions, width_px: u32, height_px: u32)
     options.output_long_side_px.filter(|&long| long != width_px.max(height_px))
 }
 
-/// As many samples along each side of a pixel as the largest canvas allows.
-fn supersampling(long_side_px: u32) -> u32 {
-    (1..=SUPERSAMPLING_MAX).rev().find(|factor| long_side_px * factor <= TARGET_SIDE_MAX_PX).unwrap_or(1)
+/// Samples along each side of a pixel of a picture of `long_side_px` that was evolved at `evolved_px`: one for each
+/// evolved pixel, within the limits, and as many as the largest canvas allows.
+fn supersampling(long_side_px: u32, evolved_px: u32) -> u32 {
+    let wanted = evolved_px.div_ceil(long_side_px).clamp(SUPERSAMPLING, SUPERSAMPLING_MAX);
+    (1..=wanted).rev().find(|factor| long_side_px * factor <= TARGET_SIDE_MAX_PX).unwrap_or(1)
 }
 
 /// The outputs as bytes; nothing is written before all of them are there.
@@ -147,8 +151,13 @@ mod tests {
     #[test]
     fn supersampling_is_reduced_where_the_canvas_would_be_too_large() {
         assert_eq!(
-            [1, 4_096, 16_383, 16_384, 21_845, 32_767, 32_768, 65_535].map(supersampling),
+            [1, 4_096, 16_383, 16_384, 21_845, 32_767, 32_768, 65_535].map(|long| supersampling(long, 1)),
             [4, 4, 4, 3, 3, 2, 1, 1]
         );
+    }
+
+    #[test]
+    fn a_reduced_picture_takes_a_sample_for_each_evolved_pixel_within_limits() {
+        assert_eq!([4_096, 1_024, 512, 256, 64].map(|long| supersampling(long, 4_096)), [4, 4, 8, 16, 16]);
     }
 }

@@ -104,7 +104,9 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
     let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
     let output_pixel_count =
         output.map_or(pixel_count, |canvas| u64::from(canvas.width_px) * u64::from(canvas.height_px));
-    let needed_bytes = memory::estimate_bytes(pixel_count, job.fly_count, output_pixel_count);
+    let list_bytes = job.init.as_ref().map_or(0, memory::list_bytes);
+    let needed_bytes =
+        memory::estimate_bytes(pixel_count, job.fly_count, output_pixel_count).saturating_add(list_bytes);
     memory::check(needed_bytes)?;
     Ok(needed_bytes)
 }
@@ -140,7 +142,7 @@ fn say_notes(job: &Job, options: &EvolveOptions, selected: &Selected) {
         report::say(&format!("smalti: {}: {warning}", options.input.display()));
     }
     if let Selected::Cpu { reason: Some(reason) } = selected {
-        report::say(&format!("smalti: the CPU twin does the work, since {reason}"));
+        report::say(&format!("smalti: computing on the CPU, since {reason}"));
     }
 }
 

@@ -209,7 +209,7 @@ fn without_vulkan_auto_takes_the_cpu_and_the_list_of_devices_says_so() {
     assert!(list["auto"]["reason"].as_str().is_some_and(|reason| reason.contains("mesa-vulkan-drivers")), "{list}");
     let table = run("devices");
     assert!(table.status.success());
-    assert!(String::from_utf8_lossy(&table.stdout).starts_with("--device auto takes the CPU twin, since no Vulkan"));
+    assert!(String::from_utf8_lossy(&table.stdout).starts_with("--device auto takes the CPU, since no Vulkan"));
 }
 
 #[test]
