@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 /// Writes `bytes` to `path`, replacing what is there in one step.
 ///
 /// A new file gets the permissions that the user's umask asks for; a replaced one keeps its own. A symbolic link
-/// stays, and the file that it names is replaced. A device or a pipe (such as `/dev/stdout`) is written to directly. On
+/// to a file stays, and that file is replaced; one that leads nowhere is itself replaced. A device or a pipe (such as `/dev/stdout`) is written to directly. On
 /// failure the old file is as it was, and nothing is left beside it.
 ///
 /// # Errors
