@@ -144,7 +144,7 @@ fn choose_among(request: &DeviceRequest, devices: &[DeviceInfo], fits: impl Fn(&
         None if devices.is_empty() => {
             format!("--device {request} was asked for and Vulkan lists no device; use --device cpu")
         }
-        None => format!("--device {request} fits none of {}; or use --device cpu", list(devices)),
+        None => format!("--device {request} fits no device; choose {}, or --device cpu", list(devices)),
     };
     Err(Error::NoSuitableDevice { why })
 }
@@ -306,7 +306,7 @@ mod tests {
             assert!(why.contains(part), "{why}");
         }
         assert!(refusal("vulkan", &[]).contains("lists no device"));
-        assert!(refusal("9", &machine()).contains("--device 9 fits none of"));
+        assert!(refusal("9", &machine()).contains("--device 9 fits no device; choose 0 ("));
     }
 
     #[test]
