@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Canvas, Evaluator, Mosaic, Population};
 use crate::output;
-use crate::photo::{self, Photo};
+use crate::photo::{self, Format, Photo};
 
 /// Quality of JPEG outputs, 1 to 100.
 const JPEG_QUALITY: u8 = 92;
@@ -97,8 +97,8 @@ pub(super) fn encode<'a>(
     let metadata = provenances.picture.picture_metadata(Some(&evolved.ending));
     let encode_one = |destination: &'a Destination| {
         let bytes = match destination.content {
-            Content::Png => photo::encode_png(&photo, &metadata),
-            Content::Jpeg => photo::encode_jpeg(&photo, JPEG_QUALITY, &metadata),
+            Content::Png => photo::encode(Format::Png, &photo, &metadata),
+            Content::Jpeg => photo::encode(Format::Jpeg { quality: JPEG_QUALITY }, &photo, &metadata),
             Content::Population => {
                 let told = provenances.population.population_metadata(&evolved.ending);
                 archive::encode(&evolved.population, &evolved.marginal, &told)
@@ -118,7 +118,7 @@ pub(super) fn encode_target<'a>(
     let Some(destination) = &options.save_target else { return Ok(None) };
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let photo = Photo { width_px, height_px, pixels: job.target.pixels().to_vec() };
-    let bytes = photo::encode_png(&photo, &provenance.picture_metadata(None))?;
+    let bytes = photo::encode(Format::Png, &photo, &provenance.picture_metadata(None))?;
     Ok(Some(EncodedFile { destination, bytes }))
 }
 

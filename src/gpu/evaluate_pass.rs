@@ -28,8 +28,8 @@ pub struct KernelShape {
 
 impl KernelShape {
     /// The shape for a class of devices. On software Vulkan small blocks make births cheapest (`cargo bench --bench
-    /// paper_run`; for whole pictures alone, 16 and 8 is a quarter faster: `cargo bench --bench kernel_shape`). For
-    /// hardware, a shape that fills a warp or a wave, not yet tuned on one.
+    /// paper_run`; `kernel_shape` for whole pictures). For hardware, a shape that fills a warp or a wave, not yet tuned
+    /// on one.
     #[must_use]
     pub fn for_device(kind: DeviceKind) -> Self {
         match kind {

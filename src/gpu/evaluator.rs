@@ -119,11 +119,8 @@ impl GpuEvaluator {
 
     /// Adds the next piece of a block's list to the work; what is left goes to `rest`.
     fn push_piece(&mut self, pending: Pending, first_flags: u32, rest: &mut Vec<Pending>) -> Result<()> {
-        let piece_of = |lanes: &[Lane]| {
-            let list = lanes[pending.lane].lists().list(pending.block as usize);
-            pending.from..list.len().min(pending.from + LIST_PIECE)
-        };
-        let piece = piece_of(&self.lanes);
+        let list_length = self.lanes[pending.lane].lists().list(pending.block as usize).len();
+        let piece = pending.from..list_length.min(pending.from + LIST_PIECE);
         let is_full = self.work.items.len() == self.pass.item_capacity()
             || self.work.entries.len() + piece.len() > self.pass.entry_capacity();
         if is_full {
@@ -132,7 +129,7 @@ impl GpuEvaluator {
         let lists = self.lanes[pending.lane].lists();
         let list = lists.list(pending.block as usize);
         let mut flags = if pending.from == 0 { first_flags } else { FLAG_CONTINUED };
-        if piece.end < list.len() {
+        if piece.end < list_length {
             flags |= FLAG_UNFINISHED;
             rest.push(Pending { from: piece.end, ..pending });
         }
