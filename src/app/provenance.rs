@@ -13,7 +13,7 @@ use super::report::Status;
 use crate::archive;
 use crate::error::Result;
 use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
-use crate::model::Population;
+use crate::model::{Blend, Population};
 use crate::photo::{self, Metadata};
 
 /// The program's name in metadata.
@@ -21,7 +21,7 @@ const SOFTWARE: &str = "smalti";
 /// Keyword of the text chunk or comment that holds the metadata as JSON.
 const KEYWORD: &str = "smalti";
 /// What the header of a population file already tells.
-const HEADER_KEYS: [&str; 3] = ["width_px", "height_px", "background"];
+const HEADER_KEYS: [&str; 4] = ["width_px", "height_px", "background", "blend"];
 
 /// Everything that decides a result.
 #[derive(Clone, Debug)]
@@ -236,6 +236,9 @@ fn population_sha256(population: &Population) -> String {
     }
     for mask in population.masks.layers() {
         hash.update(bytemuck::cast_slice(mask.texels()));
+    }
+    if population.masks.blend() == Blend::Translucent {
+        hash.update(b"translucent");
     }
     hexadecimal(&hash.finalize())
 }

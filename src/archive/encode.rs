@@ -21,7 +21,7 @@ const LEVEL: i64 = 6;
 ///
 /// # Errors
 /// [`Error::Usage`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the file
-/// (`schema`, `width_px`, `height_px`, `background`), or if there are more than [`FLY_COUNT_MAX`] flies.
+/// (`schema`, `width_px`, `height_px`, `background`, `blend`), or if there are more than [`FLY_COUNT_MAX`] flies.
 pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
     let fly_count = population.flies.len();
     if fly_count != fitness.len() || fly_count > FLY_COUNT_MAX {
@@ -31,7 +31,9 @@ pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value
             fitness.len()
         )));
     }
-    if let Some(key) = ["schema", "width_px", "height_px", "background"].iter().find(|&&key| meta.contains_key(key)) {
+    if let Some(key) =
+        ["schema", "width_px", "height_px", "background", "blend"].iter().find(|&&key| meta.contains_key(key))
+    {
         return Err(Error::Usage(format!("the metadata of a population cannot have a `{key}`: the file has its own")));
     }
     write_members(population, fitness, meta)
@@ -59,6 +61,7 @@ fn write_members(
         width_px: population.width_px,
         height_px: population.height_px,
         background: population.background,
+        blend: population.masks.blend().into(),
         meta: meta.clone(),
     };
     members.start(HEADER_MEMBER)?;

@@ -11,7 +11,7 @@ mod read;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::model::Population;
+use crate::model::{Blend, Population};
 
 pub use encode::encode;
 pub use read::{read, read_meta};
@@ -41,6 +41,42 @@ struct Header {
     width_px: u32,
     height_px: u32,
     background: [u8; 3],
+    /// How coverage is read; opaque masks are the rule and need no word.
+    #[serde(default, skip_serializing_if = "BlendName::is_opaque")]
+    blend: BlendName,
     #[serde(flatten)]
     meta: Map<String, Value>,
+}
+
+/// [`Blend`] as the file spells it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum BlendName {
+    #[default]
+    Opaque,
+    Translucent,
+}
+
+impl BlendName {
+    fn is_opaque(&self) -> bool {
+        *self == Self::Opaque
+    }
+}
+
+impl From<Blend> for BlendName {
+    fn from(blend: Blend) -> Self {
+        match blend {
+            Blend::Opaque => Self::Opaque,
+            Blend::Translucent => Self::Translucent,
+        }
+    }
+}
+
+impl From<BlendName> for Blend {
+    fn from(name: BlendName) -> Self {
+        match name {
+            BlendName::Opaque => Self::Opaque,
+            BlendName::Translucent => Self::Translucent,
+        }
+    }
 }

@@ -51,7 +51,7 @@ pub fn read_meta(path: &Path) -> Result<Map<String, Value>> {
 fn read_population(path: &Path) -> Result<Archive, String> {
     let mut members = Members::open(path)?;
     let header = members.header()?;
-    let masks = members.masks()?;
+    let masks = members.masks()?.with_blend(header.blend.into());
     let [x, y, z, r, g, b, w, h, angle] = members.genes()?;
     let fly_count = x.len();
     let mask = members.column::<u16>("mask", "u16")?;

@@ -9,11 +9,21 @@ pub const COVERAGE_THRESHOLD: u8 = 128;
 /// Largest number of layers in a set: what every Vulkan 1.3 device offers in an array image.
 pub const MASK_LAYERS_MAX: usize = 256;
 
+/// How a texel's coverage decides what shows through the tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Blend {
+    /// The tile is there from [`COVERAGE_THRESHOLD`] on, and hides what lies behind it.
+    #[default]
+    Opaque,
+    /// Coverage is the tile's opacity: 0 shows what lies behind, 255 hides it.
+    Translucent,
+}
+
 /// One texel: whether the tile is there, and how bright its colour is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Texel {
-    /// 0 is a hole, 255 is full; the tile is opaque from [`COVERAGE_THRESHOLD`] on.
+    /// 0 is a hole, 255 is full; what lies between is for [`Blend`] to say.
     pub coverage: u8,
     /// Factor of every colour channel: a channel `c` becomes `(c * shade + 127) / 255`.
     pub shade: u8,
@@ -63,16 +73,17 @@ impl Mask {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MaskSet {
     layers: Vec<Mask>,
+    blend: Blend,
 }
 
 impl Default for MaskSet {
     fn default() -> Self {
-        Self { layers: vec![Mask::square()] }
+        Self { layers: vec![Mask::square()], blend: Blend::Opaque }
     }
 }
 
 impl MaskSet {
-    /// The set of the square and `others`, which become layers 1, 2, ...
+    /// The set of the square and `others`, which become layers 1, 2, ...; opaque.
     ///
     /// # Errors
     /// [`Error::Usage`] if there are more than [`MASK_LAYERS_MAX`] layers.
@@ -86,7 +97,19 @@ impl MaskSet {
         }
         let mut layers = vec![Mask::square()];
         layers.extend(others);
-        Ok(Self { layers })
+        Ok(Self { layers, blend: Blend::Opaque })
+    }
+
+    /// The same masks, their coverage read as `blend` says.
+    #[must_use]
+    pub fn with_blend(self, blend: Blend) -> Self {
+        Self { blend, ..self }
+    }
+
+    /// How the masks' coverage is read.
+    #[must_use]
+    pub fn blend(&self) -> Blend {
+        self.blend
     }
 
     /// All layers; the first is the square.

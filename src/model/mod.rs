@@ -19,7 +19,7 @@ pub mod tile;
 pub use evaluation::{Change, Evaluation, Evaluator, Layers, NO_FLY};
 pub use fly::Fly;
 pub use lane::{Lane, Scene};
-pub use mask::{Mask, MaskSet};
+pub use mask::{Blend, Mask, MaskSet};
 pub use mosaic::{Mosaic, Patch};
 pub use population::Population;
 pub use target::{Rgb, Target};
