@@ -70,6 +70,18 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     Ok(Loaded { photo, original_width_px, original_height_px, sha256, warnings })
 }
 
+/// Whether the file at `path` begins like a picture that can be read.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read.
+pub(super) fn is_picture(path: &Path) -> Result<bool> {
+    let mut signature = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(SIGNATURE_BYTES).read_to_end(&mut signature))
+        .map_err(|error| Error::input(path, why_unreadable(&error)))?;
+    Ok(known_format(&signature).is_some())
+}
+
 /// The bytes of the file at `path`, once its first bytes have shown that it is a picture.
 fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
     let unreadable = |error: io::Error| Error::input(path, why_unreadable(&error));
