@@ -18,6 +18,7 @@ pub use decode::{Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
 pub use encode::{Format, encode, encode_jpeg, encode_png};
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
 pub use palette::{COLOR_COUNT_MAX, palette_of, read_palette, reduce};
+pub use resize::fitted;
 
 /// A picture in memory: 8-bit sRGB, no alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]
