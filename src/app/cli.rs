@@ -7,6 +7,8 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::presets::{self, Preset};
+use super::values::ColorCount;
 use super::{report, values};
 use crate::model::Rgb;
 
@@ -102,9 +104,15 @@ pub(super) struct EvolveArgs {
     /// Number of tiles, 1 to 1,000,000 (suffixes k, M) [default: 2500 * sqrt(width * height) / 256, rounded]
     #[arg(short = 'n', long, value_name = "N", value_parser = values::count, help_heading = "Picture")]
     pub tiles: Option<u64>,
-    /// Longer side that the picture is reduced to before it is evolved, 1 to 65,535 px; never enlarged
-    #[arg(long, value_name = "PX", value_parser = values::count, default_value = "512", help_heading = "Picture")]
-    pub size: u64,
+    /// Longer side that the picture is reduced to before it is evolved, 1 to 65,535 px; never enlarged [default: 512]
+    #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
+    pub size: Option<u64>,
+    /// Colours that the picture is reduced to before it is evolved: full, or 1 to 256 [default: full]
+    #[arg(long, value_name = "K", value_parser = values::color_count, help_heading = "Picture", conflicts_with = "palette")]
+    pub colors: Option<ColorCount>,
+    /// Palette that picture and tiles are held to: .gpl, .pal, .hex (lines of RRGGBB), or the colours of a picture
+    #[arg(long, value_name = "FILE", help_heading = "Picture")]
+    pub palette: Option<PathBuf>,
     /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: black, or as in --init]
     #[arg(long, value_name = "COLOR", value_parser = values::color, help_heading = "Picture")]
     pub background: Option<Rgb>,
@@ -112,18 +120,21 @@ pub(super) struct EvolveArgs {
     #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]
     pub init: Option<PathBuf>,
 
+    /// One of the paper's 12 schemes (Table 1), paper-1 to paper-12; other options change parts of it
+    #[arg(long, value_name = "NAME", value_parser = presets::parse, help_heading = "Evolution")]
+    pub preset: Option<Preset>,
     /// How to evolve; `paper` is the published Fly algorithm
     #[arg(long, value_enum, value_name = "NAME", default_value = "paper", help_heading = "Evolution")]
     pub scheme: SchemeName,
-    /// Births of each run (suffixes k, M)
-    #[arg(long, value_name = "B", value_parser = values::count, default_value = "40k", help_heading = "Evolution")]
-    pub births: u64,
+    /// Births of each run (suffixes k, M) [default: 40k]
+    #[arg(long, value_name = "B", value_parser = values::count, help_heading = "Evolution")]
+    pub births: Option<u64>,
     /// Births evaluated together, 1 to N; more is faster on a GPU, 1 is the published algorithm
     #[arg(long, value_name = "K", value_parser = values::count, default_value = "1", help_heading = "Evolution")]
     pub batch_births: u64,
-    /// Further runs, each from the best population so far, 0 to 1,000,000
-    #[arg(long, value_name = "R", value_parser = values::count, default_value = "0", help_heading = "Evolution")]
-    pub restarts: u64,
+    /// Further runs, each from the best population so far, 0 to 1,000,000 [default: 0, or as in --preset]
+    #[arg(long, value_name = "R", value_parser = values::count, help_heading = "Evolution")]
+    pub restarts: Option<u64>,
     /// Factor of all mutation steps at each restart, 0.00001 to 1
     #[arg(long, value_name = "F", default_value_t = 1.0, help_heading = "Evolution")]
     pub cool: f64,

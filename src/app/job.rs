@@ -4,12 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::memory;
-use super::options::EvolveOptions;
+use super::options::{Colors, EvolveOptions};
 use crate::archive;
 use crate::error::{Error, Result};
 use crate::evolve::evolution::random_population;
 use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
-use crate::photo::{self, Loaded, ReadOptions};
+use crate::photo::{self, Loaded, Photo, ReadOptions};
 
 /// The inputs of one evolution, read and fitted together.
 #[derive(Debug)]
@@ -22,6 +22,8 @@ pub(super) struct Job {
     /// What was ignored in the input, one sentence each.
     pub warnings: Vec<String>,
     pub background: Rgb,
+    /// Colours that the tiles are held to, if any.
+    pub palette: Option<Arc<[Rgb]>>,
     pub fly_count: usize,
     /// The population to begin with, if not a random one.
     pub init: Option<Population>,
@@ -38,8 +40,9 @@ impl Job {
         let of_init = init.as_ref().map(|population| population.background);
         let background = options.background.or(of_init).unwrap_or_default();
         let reading = ReadOptions { background, long_side_px: Some(options.long_side_px) };
-        let Loaded { photo, original_width_px, original_height_px, sha256, warnings } =
+        let Loaded { mut photo, original_width_px, original_height_px, sha256, warnings } =
             photo::read(&options.input, &reading)?;
+        let palette = reduce_colors(&mut photo, &options.colors)?;
         let target = Target::new(photo.width_px, photo.height_px, photo.pixels)?;
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
@@ -55,6 +58,7 @@ impl Job {
             input_sha256: sha256,
             warnings,
             background,
+            palette,
             init,
         })
     }
@@ -78,6 +82,23 @@ impl Job {
     pub(super) fn first_flies(&self, seed: u64) -> Vec<Fly> {
         let random = || random_population(self.target.width_px(), self.target.height_px(), self.fly_count, seed);
         self.init.as_ref().map_or_else(random, |population| population.flies.clone())
+    }
+}
+
+/// Reduces the picture to the colours asked for; returns those that the tiles are held to, too.
+fn reduce_colors(photo: &mut Photo, colors: &Colors) -> Result<Option<Arc<[Rgb]>>> {
+    match colors {
+        Colors::Full => Ok(None),
+        Colors::Few(count) => {
+            let palette = photo::palette_of(photo, *count)?;
+            photo::reduce(photo, &palette);
+            Ok(None)
+        }
+        Colors::Palette(path) => {
+            let palette = photo::read_palette(path)?;
+            photo::reduce(photo, &palette);
+            Ok(Some(palette.into()))
+        }
     }
 }
 

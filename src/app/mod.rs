@@ -11,6 +11,7 @@ mod interrupt;
 mod job;
 mod memory;
 mod options;
+mod presets;
 mod progress;
 mod provenance;
 mod report;

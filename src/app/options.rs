@@ -5,7 +5,10 @@ use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
 use super::destination::Destination;
+use super::presets::Preset;
+use super::values::ColorCount;
 use crate::error::{Error, Result};
+use crate::evolve::scheme::PAPER_BIRTHS;
 use crate::evolve::{OnDry, PaperScheme};
 use crate::model::Rgb;
 use crate::model::population::FLY_COUNT_MAX;
@@ -41,6 +44,19 @@ pub(super) enum Verbosity {
     Verbose,
 }
 
+/// Which colours the target keeps.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Colors {
+    Full,
+    /// At most so many of its own.
+    Few(usize),
+    /// Those of a palette file, and the tiles too.
+    Palette(PathBuf),
+}
+
+/// Longer side in px that pictures are reduced to.
+const LONG_SIDE_PX: u64 = 512;
+
 /// Everything that `smalti evolve` was asked to do.
 #[derive(Clone, Debug)]
 pub(super) struct EvolveOptions {
@@ -55,6 +71,7 @@ pub(super) struct EvolveOptions {
     pub fly_count: Option<usize>,
     /// Longer side in px that the picture is reduced to.
     pub long_side_px: u32,
+    pub colors: Colors,
     /// `None` means the one of `init`, else black.
     pub background: Option<Rgb>,
     pub init: Option<PathBuf>,
@@ -83,6 +100,7 @@ impl EvolveOptions {
                 "--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned(),
             ));
         }
+        let preset_side = args.preset.map(|preset| u64::from(preset.side_px));
         let options = Self {
             input: args.input.clone(),
             outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
@@ -91,7 +109,8 @@ impl EvolveOptions {
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
             mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
             fly_count: fly_count.map(|count| count as usize),
-            long_side_px: side_px("--size", args.size)?,
+            long_side_px: side_px("--size", args.size.unwrap_or(preset_side.unwrap_or(LONG_SIDE_PX)))?,
+            colors: colors(args),
             background: args.background,
             init: args.init.clone(),
             scheme: scheme(args)?,
@@ -127,10 +146,21 @@ fn device(text: &str) -> Result<DeviceRequest> {
     text.parse()
 }
 
+fn colors(args: &EvolveArgs) -> Colors {
+    let of_preset = args.preset.and_then(|preset| preset.color_count);
+    match (&args.palette, args.colors) {
+        (Some(path), _) => Colors::Palette(path.clone()),
+        (None, Some(ColorCount::Few(count))) => Colors::Few(count),
+        (None, Some(ColorCount::Full)) => Colors::Full,
+        (None, None) => of_preset.map_or(Colors::Full, Colors::Few),
+    }
+}
+
 fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
     let SchemeName::Paper = args.scheme;
     let batch_births = in_range("--batch-births", args.batch_births, (1, FLY_COUNT_MAX as u64))?;
-    let restarts = in_range("--restarts", args.restarts, (0, RESTARTS_MAX))?;
+    let of_preset = args.preset.map_or(0, |preset| u64::from(preset.restarts()));
+    let restarts = in_range("--restarts", args.restarts.unwrap_or(of_preset), (0, RESTARTS_MAX))?;
     let patience = args.patience.map(|births| in_range("--patience", births, (1, u64::MAX))).transpose()?;
     let cool_q16 = (args.cool * 65_536.0).round();
     if !(COOL_MIN..=1.0).contains(&args.cool) {
@@ -141,7 +171,7 @@ fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
     }
     Ok(PaperScheme {
         seed: args.seed,
-        births: args.births,
+        births: args.births.unwrap_or(args.preset.map_or(PAPER_BIRTHS, Preset::births)),
         restarts: restarts as u32,
         cool_q16: cool_q16 as u32,
         on_dry: match args.on_dry {
