@@ -81,7 +81,9 @@ impl Engine {
         let mut any_alive = false;
         for evolution in &mut self.evolutions {
             let first = self.changes.len();
-            match evolution.breed(&self.evaluator.evaluation(evolution.lane()), &mut self.changes) {
+            let (lane, evaluation) =
+                (self.evaluator.lane(evolution.lane()), self.evaluator.evaluation(evolution.lane()));
+            match evolution.breed(lane, &evaluation, &mut self.changes) {
                 Step::Replace => any_alive = true,
                 Step::Restart => {
                     any_alive = true;

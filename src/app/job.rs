@@ -7,7 +7,7 @@ use super::memory;
 use super::options::{Colors, EvolveOptions};
 use crate::archive;
 use crate::error::{Error, Result};
-use crate::evolve::evolution::random_population;
+use crate::evolve::{PaperScheme, begin_from, first_population};
 use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
 use crate::photo::{self, Loaded, Photo, ReadOptions};
 
@@ -79,9 +79,9 @@ impl Job {
     }
 
     /// The flies to begin with.
-    pub(super) fn first_flies(&self, seed: u64) -> Vec<Fly> {
-        let random = || random_population(self.target.width_px(), self.target.height_px(), self.fly_count, seed);
-        self.init.as_ref().map_or_else(random, |population| population.flies.clone())
+    pub(super) fn first_flies(&self, scheme: &PaperScheme) -> Vec<Fly> {
+        let random = || first_population(scheme, &self.target, self.fly_count);
+        self.init.as_ref().map_or_else(random, |population| begin_from(scheme, population.flies.clone()))
     }
 }
 

@@ -182,6 +182,7 @@ fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
         patience,
         target_sae: args.target_sae,
         batch_births: batch_births as u32,
+        ..PaperScheme::default()
     })
 }
 

@@ -156,7 +156,7 @@ fn evolve_job(
 ) -> Result<Evolved> {
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
-    let first_flies = job.first_flies(options.scheme.seed);
+    let first_flies = job.first_flies(&options.scheme);
     let evolution = Evolution::new(options.scheme.clone(), 0, width_px, height_px, first_flies);
     let mut engine = Engine::new(evaluator, vec![evolution]);
     let mut watch = Watch::begin(interrupt, options.time_limit, Progress::new(options.progress));
