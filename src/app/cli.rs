@@ -8,6 +8,7 @@ use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::presets::{self, Preset};
+use super::score::ScoreArgs;
 use super::values::ColorCount;
 use super::{report, values};
 use crate::model::Rgb;
@@ -18,8 +19,8 @@ use crate::model::Rgb;
     name = "smalti",
     version,
     about = "Evolves pictures into mosaics of thousands of tiles.",
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage or unreadable input, 4 no suitable device,\n\
-                  75 interrupted or device lost (run the same command again), 130 second Ctrl-C."
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage or unreadable input, 3 some items failed,\n\
+                  4 no suitable device, 75 interrupted or device lost (run the same command again), 130 second Ctrl-C."
 )]
 pub struct Cli {
     /// What to do.
@@ -65,6 +66,11 @@ pub(super) enum Command {
     Evolve(Box<EvolveArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
+    /// Measure how much pictures are like a reference
+    ///
+    /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed with
+    /// numpy, scipy and scikit-image. Of an animation the first frame is measured.
+    Score(ScoreArgs),
 }
 
 const EVOLVE_EXAMPLES: &str = "\

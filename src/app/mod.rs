@@ -17,6 +17,7 @@ mod provenance;
 mod report;
 mod result;
 mod run;
+mod score;
 mod values;
 mod watch;
 
@@ -30,5 +31,6 @@ pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
         cli::Command::Devices(args) => devices::list(args),
+        cli::Command::Score(args) => score::score(args),
     }
 }

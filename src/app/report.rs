@@ -12,7 +12,6 @@ use super::job::Job;
 use super::options::{EvolveOptions, Verbosity};
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
-use crate::model::{Mosaic, Target};
 
 /// What became of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -132,24 +131,6 @@ impl Row {
 /// Milliseconds with three decimals.
 pub(super) fn milliseconds(duration: Duration) -> f64 {
     duration.as_micros() as f64 / 1e3
-}
-
-/// Peak signal-to-noise ratio in dB over all channels; `None` if the pictures are equal.
-pub(super) fn psnr_db(mosaic: &Mosaic, target: &Target) -> Option<f64> {
-    let squares: u64 = differences(mosaic, target).map(|difference| difference.pow(2)).sum();
-    let channel_count = mosaic.pixels.len() as f64 * 3.0;
-    (squares > 0).then(|| 10.0 * (255.0_f64.powi(2) * channel_count / squares as f64).log10())
-}
-
-/// Sum of absolute errors between a mosaic at evaluation size and its target.
-pub(super) fn sum_of_errors(mosaic: &Mosaic, target: &Target) -> u64 {
-    differences(mosaic, target).sum()
-}
-
-/// The absolute difference of each channel of each pixel.
-fn differences(mosaic: &Mosaic, target: &Target) -> impl Iterator<Item = u64> {
-    let pairs = mosaic.pixels.as_flattened().iter().zip(target.pixels().as_flattened());
-    pairs.map(|(&drawn, &wanted)| u64::from(drawn.abs_diff(wanted)))
 }
 
 /// The summary of a finished evolution.

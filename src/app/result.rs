@@ -8,6 +8,7 @@ use super::provenance::{Ending, Provenance, Provenances};
 use super::report;
 use crate::archive;
 use crate::error::{Error, Result};
+use crate::metrics::Difference;
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Canvas, Evaluator, Mosaic, Population};
 use crate::output;
@@ -54,7 +55,7 @@ pub(super) fn draw(
     let (scored, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
     let (width_px, height_px) = (population.width_px, population.height_px);
     let mosaic = evaluator.draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
-    let drawn = report::sum_of_errors(&mosaic, &evaluator.scene(0).target);
+    let drawn = Difference::between(&mosaic.pixels, evaluator.scene(0).target.pixels()).sae();
     if scored != ending.sae || drawn != ending.sae {
         return Err(Error::Internal(format!(
             "the best population had an SAE of {}, is evaluated to {scored} and drawn with {drawn}",

@@ -18,6 +18,7 @@ use super::{destination, memory, result};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
+use crate::metrics::Difference;
 use crate::model::{Canvas, Population};
 use crate::vk::ValidationLog;
 
@@ -174,7 +175,7 @@ fn evolve_job(
         flies: evolution.best_flies().to_vec(),
     };
     let evolved = result::draw(engine.evaluator(), options, population, ending)?;
-    row.psnr = report::psnr_db(&evolved.mosaic, &job.target);
+    row.psnr = Difference::between(&evolved.mosaic.pixels, job.target.pixels()).psnr_db();
     drop(engine);
     validation_log.map_or(Ok(()), |log| check_messages(&log))?;
     Ok(evolved)

@@ -14,6 +14,7 @@ mod layering;
 mod layout;
 mod reference;
 mod scenarios;
+mod score;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
 mod shaders_fresh;
