@@ -76,6 +76,11 @@ impl EdgeMap {
         Self { width: smooth.width, strengths, places }
     }
 
+    /// Whether each pixel belongs to an edge.
+    pub(super) fn pixels(&self) -> Vec<bool> {
+        self.strengths.iter().map(|&strength| strength == Strength::Sure).collect()
+    }
+
     /// Share of the edge pixels that lie within the tolerance of one of `others`; 0 if there are none.
     fn share_near(&self, others: &Self) -> f64 {
         let near = self.places.iter().filter(|&&place| others.is_near(place)).count();

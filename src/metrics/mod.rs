@@ -95,6 +95,14 @@ impl<'a> Reference<'a> {
     }
 }
 
+/// Whether each pixel of `picture` belongs to an edge, as [`Score::edges`] sees it.
+///
+/// # Errors
+/// As [`Reference::new`].
+pub fn edge_pixels(picture: Picture<'_>) -> Result<Vec<bool>, String> {
+    Ok(Reference::new(picture)?.edges.pixels())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

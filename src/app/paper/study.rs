@@ -5,12 +5,10 @@ use std::sync::Arc;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use rayon::prelude::*;
-
 use crate::app::device::{Opened, Selected};
 use crate::app::interrupt::Interrupt;
 use crate::app::progress::{Progress, Standing};
-use crate::engine::{Engine, Observer};
+use crate::engine::{Engine, Observer, side_by_side};
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, PaperScheme, Spread, StopReason, first_population};
 use crate::metrics::{Picture, Reference, Score};
@@ -107,7 +105,7 @@ impl<'a> Study<'a> {
         let planned = |recipe: &Recipe| recipe.scheme.births.saturating_mul(u64::from(recipe.scheme.restarts) + 1);
         self.tally().births_planned += recipes.iter().map(planned).sum::<u64>();
         match self.device {
-            Selected::Cpu { .. } => recipes.par_iter().with_max_len(1).map(|recipe| self.evolve_one(recipe)).collect(),
+            Selected::Cpu { .. } => side_by_side(recipes.len(), |number| self.evolve_one(&recipes[number])),
             Selected::Vulkan { .. } => recipes.iter().map(|recipe| self.evolve_one(recipe)).collect(),
         }
     }
