@@ -17,6 +17,7 @@ mod scenarios;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
 mod shaders_fresh;
+mod shapes;
 mod spirv;
 mod vulkan;
 mod vulkan_failures;
