@@ -16,6 +16,7 @@ pub mod metrics;
 pub mod model;
 pub mod output;
 pub mod photo;
+pub mod shapes;
 pub mod vk;
 
 pub use error::{Error, Result};

@@ -12,6 +12,7 @@ mod jpeg_segments;
 mod metadata;
 mod palette;
 mod resize;
+mod stencil;
 
 pub(crate) use decode::why_unreadable;
 pub use decode::{Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
@@ -19,6 +20,7 @@ pub use encode::{Format, encode, encode_jpeg, encode_png};
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
 pub use palette::{COLOR_COUNT_MAX, palette_of, read_palette, reduce};
 pub use resize::fitted;
+pub use stencil::{Stencil, decode_stencil, is_picture};
 
 /// A picture in memory: 8-bit sRGB, no alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]

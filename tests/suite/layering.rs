@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LEVELS: [&[&str]; 7] = [
     &["error"],
     &["photo", "output", "model", "metrics"],
-    &["archive", "evolve", "cpu", "vk"],
+    &["archive", "evolve", "shapes", "cpu", "vk"],
     &["gpu"],
     &["engine"],
     &["app"],

@@ -18,6 +18,7 @@ mod score;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
 mod shaders_fresh;
+mod shapes;
 mod spirv;
 mod vulkan;
 mod vulkan_failures;
