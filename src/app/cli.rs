@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::look::LookArgs;
 use super::presets::{self, Preset};
 use super::score::ScoreArgs;
 use super::values::ColorCount;
@@ -125,6 +126,12 @@ pub(super) struct EvolveArgs {
     /// Population to begin with, a .npz file of the same picture size; it also gives the number of tiles
     #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]
     pub init: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub look: LookArgs,
+    /// Masks that all tiles change to at the first restart [default: none, or as in --preset]
+    #[arg(long = "restart-mask", value_name = "NAME|FILE", value_delimiter = ',', help_heading = "Tiles")]
+    pub restart_masks: Vec<PathBuf>,
 
     /// One of the paper's 12 schemes (Table 1), paper-1 to paper-12; other options change parts of it
     #[arg(long, value_name = "NAME", value_parser = presets::parse, help_heading = "Evolution")]

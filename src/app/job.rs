@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::look::Dress;
 use super::memory;
 use super::options::{Colors, EvolveOptions};
 use crate::archive;
 use crate::error::{Error, Result};
-use crate::evolve::{PaperScheme, begin_from, first_population};
+use crate::evolve::{Palette, PaperScheme, begin_from, first_population};
 use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
 use crate::photo::{self, Loaded, Photo, ReadOptions};
 
@@ -25,6 +26,8 @@ pub(super) struct Job {
     /// Colours that the tiles are held to, if any.
     pub palette: Option<Arc<[Rgb]>>,
     pub fly_count: usize,
+    /// The masks that were asked for; none leaves the flies as they are, which is square unless `init` says otherwise.
+    pub dress: Option<Dress>,
     /// The population to begin with, if not a random one.
     pub init: Option<Population>,
 }
@@ -59,13 +62,28 @@ impl Job {
             warnings,
             background,
             palette,
+            dress: dress(options)?,
             init,
         })
     }
 
     /// The tile shapes that the flies may wear.
     pub(super) fn masks(&self) -> MaskSet {
-        self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone())
+        let of_init = || self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone());
+        self.dress.as_ref().map_or_else(of_init, |dress| dress.masks.clone())
+    }
+
+    /// The scheme with what depends on files: the masks that flies wear, and the palette of their colours.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if the palette has no colours, or too many.
+    pub(super) fn scheme(&self, scheme: &PaperScheme) -> Result<PaperScheme> {
+        let mut scheme = scheme.clone();
+        if let Some(dress) = &self.dress {
+            scheme.masks.clone_from(&dress.layers_by_run);
+        }
+        scheme.color.palette = self.palette.clone().map(Palette::new).transpose()?;
+        Ok(scheme)
     }
 
     /// The lane that the job becomes.
@@ -83,6 +101,15 @@ impl Job {
         let random = || first_population(scheme, &self.target, self.fly_count);
         self.init.as_ref().map_or_else(random, |population| begin_from(scheme, population.flies.clone()))
     }
+}
+
+/// The masks that were asked for, unless they are those that flies wear anyway.
+fn dress(options: &EvolveOptions) -> Result<Option<Dress>> {
+    if options.look.is_default() {
+        return Ok(None);
+    }
+    let dress = options.look.dress()?;
+    Ok(if options.init.is_none() && dress.is_plain() { None } else { Some(dress) })
 }
 
 /// Reduces the picture to the colours asked for; returns those that the tiles are held to, too.
@@ -122,7 +149,7 @@ fn check_fit(population: &Population, path: &Path, target: &Target) -> Result<()
 }
 
 /// Flies for a picture, so that a fly's share of it grows with its side: 2,500 at 256x256, 5,000 at 512x512 (Table 2).
-fn default_fly_count(width_px: u32, height_px: u32) -> usize {
+pub(super) fn default_fly_count(width_px: u32, height_px: u32) -> usize {
     let pixels = f64::from(width_px) * f64::from(height_px);
     // IEEE 754 fixes the root and the product, so every machine agrees.
     (2500.0 * pixels.sqrt() / 256.0).round() as usize

@@ -55,6 +55,13 @@ pub(super) struct Dress {
     pub layers_by_run: Vec<Vec<u16>>,
 }
 
+impl Dress {
+    /// Whether all flies are plain opaque squares from first to last.
+    pub(super) fn is_plain(&self) -> bool {
+        self.masks == MaskSet::default() && self.layers_by_run.iter().flatten().all(|&layer| layer == 0)
+    }
+}
+
 impl Look {
     /// Checks the flags; `restart_masks` are those from the first restart on, and what is not told is as in `preset`.
     ///
@@ -87,13 +94,17 @@ impl Look {
         Ok(Self { masks, restart_masks, shader: args.shader.unwrap_or(Shader::Template), blend, opacity })
     }
 
-    /// Whether plain opaque squares will do.
-    pub(super) fn is_plain(&self) -> bool {
-        let square = |path: &PathBuf| path.as_os_str() == BuiltIn::Square.name();
-        self.masks.iter().all(square)
+    /// Whether nothing was asked for.
+    pub(super) fn is_default(&self) -> bool {
+        self.masks.is_empty()
             && self.restart_masks.is_empty()
-            && (self.masks.is_empty() || self.shader == Shader::Template)
+            && self.shader == Shader::Template
             && self.blend == Blend::Opaque
+    }
+
+    /// Whether tiles change their masks at the first restart.
+    pub(super) fn changes_at_restart(&self) -> bool {
+        !self.restart_masks.is_empty()
     }
 
     /// Reads and shades the masks.

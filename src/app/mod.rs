@@ -9,6 +9,7 @@ mod device;
 mod devices;
 mod interrupt;
 mod job;
+mod look;
 mod memory;
 mod options;
 mod presets;

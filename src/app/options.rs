@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
 use super::destination::Destination;
+use super::look::Look;
 use super::presets::Preset;
 use super::values::ColorCount;
 use crate::error::{Error, Result};
@@ -72,6 +73,7 @@ pub(super) struct EvolveOptions {
     /// Longer side in px that the picture is reduced to.
     pub long_side_px: u32,
     pub colors: Colors,
+    pub look: Look,
     /// `None` means the one of `init`, else black.
     pub background: Option<Rgb>,
     pub init: Option<PathBuf>,
@@ -111,6 +113,7 @@ impl EvolveOptions {
             fly_count: fly_count.map(|count| count as usize),
             long_side_px: side_px("--size", args.size.unwrap_or(preset_side.unwrap_or(LONG_SIDE_PX)))?,
             colors: colors(args),
+            look: Look::new(&args.look, &args.restart_masks, args.preset)?,
             background: args.background,
             init: args.init.clone(),
             scheme: scheme(args)?,
@@ -121,6 +124,9 @@ impl EvolveOptions {
             progress: progress(args),
             verbosity: verbosity(args),
         };
+        if options.look.changes_at_restart() && options.scheme.restarts == 0 {
+            return Err(Error::Usage("--restart-mask needs a restart; add --restarts".to_owned()));
+        }
         if args.json && options.outputs.iter().any(Destination::is_stdout) {
             return Err(Error::Usage("-o - and --json both write to stdout; drop one of them".to_owned()));
         }

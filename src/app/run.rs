@@ -157,8 +157,9 @@ fn evolve_job(
 ) -> Result<Evolved> {
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
-    let first_flies = job.first_flies(&options.scheme);
-    let evolution = Evolution::new(options.scheme.clone(), 0, width_px, height_px, first_flies);
+    let scheme = job.scheme(&options.scheme)?;
+    let first_flies = job.first_flies(&scheme);
+    let evolution = Evolution::new(scheme, 0, width_px, height_px, first_flies);
     let mut engine = Engine::new(evaluator, vec![evolution]);
     let mut watch = Watch::begin(interrupt, options.time_limit, Progress::new(options.progress));
     let ran = engine.run(&mut watch);
