@@ -15,6 +15,7 @@ pub mod gpu;
 pub mod model;
 pub mod output;
 pub mod photo;
+pub mod plot;
 pub mod vk;
 
 pub use error::{Error, Result};

@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::scheme::SchemeArgs;
 use super::{report, values};
 use crate::model::Rgb;
 
@@ -89,6 +90,9 @@ pub(super) struct EvolveArgs {
     /// Also write the picture that was evolved towards, fitted to size, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
+    /// Also write how the error fell, birth by birth, as a table (.csv) or a plot (.svg); may repeat
+    #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
+    pub curves: Vec<PathBuf>,
     /// Replace outputs that are not smalti's or were made with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -142,6 +146,8 @@ pub(super) struct EvolveArgs {
     /// Number that decides every random choice
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Evolution")]
     pub seed: u64,
+    #[command(flatten)]
+    pub variation: SchemeArgs,
 
     /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
     #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]

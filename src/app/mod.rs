@@ -4,6 +4,8 @@
 //! on stderr; stdout carries data only.
 
 mod cli;
+mod curve;
+mod curve_file;
 mod destination;
 mod device;
 mod devices;
@@ -16,6 +18,7 @@ mod provenance;
 mod report;
 mod result;
 mod run;
+mod scheme;
 mod values;
 mod watch;
 
