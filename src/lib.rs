@@ -16,6 +16,7 @@ pub mod metrics;
 pub mod model;
 pub mod output;
 pub mod photo;
+pub mod plot;
 pub mod shapes;
 pub mod vk;
 

@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use super::look::LookArgs;
 use super::presets::{self, Preset};
+use super::scheme::SchemeArgs;
 use super::score::ScoreArgs;
 use super::values::ColorCount;
 use super::{report, values};
@@ -98,6 +99,9 @@ pub(super) struct EvolveArgs {
     /// Also write the picture that was evolved towards, fitted to size, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
+    /// Also write how the error fell, birth by birth, as a table (.csv) or a plot (.svg); may repeat
+    #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
+    pub curves: Vec<PathBuf>,
     /// Replace outputs that are not smalti's or were made with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -166,6 +170,8 @@ pub(super) struct EvolveArgs {
     /// Number that decides every random choice
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Evolution")]
     pub seed: u64,
+    #[command(flatten)]
+    pub variation: SchemeArgs,
 
     /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
     #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]

@@ -4,6 +4,8 @@
 //! on stderr; stdout carries data only.
 
 mod cli;
+mod curve;
+mod curve_file;
 mod destination;
 mod device;
 mod devices;
@@ -18,6 +20,7 @@ mod provenance;
 mod report;
 mod result;
 mod run;
+mod scheme;
 mod score;
 mod values;
 mod watch;

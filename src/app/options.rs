@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
+use super::curve_file::CurveFile;
 use super::destination::Destination;
 use super::look::Look;
 use super::presets::Preset;
@@ -64,6 +65,8 @@ pub(super) struct EvolveOptions {
     pub input: PathBuf,
     pub outputs: Vec<Destination>,
     pub save_target: Option<Destination>,
+    /// Where the curve of the evolution goes.
+    pub curves: Vec<CurveFile>,
     /// Longer side of the written picture in px; `None` writes it as evolved.
     pub output_long_side_px: Option<u32>,
     pub overwrite: Overwrite,
@@ -107,6 +110,7 @@ impl EvolveOptions {
             input: args.input.clone(),
             outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
             save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
+            curves: args.curves.iter().map(|path| CurveFile::new(path)).collect::<Result<_>>()?,
             output_long_side_px: args.output_size.map(|px| side_px("--output-size", px)).transpose()?,
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
             mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
@@ -175,7 +179,7 @@ fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
     if cool_q16 < 65_536.0 && restarts == 0 {
         return Err(Error::Usage("--cool changes only the runs after the first; add --restarts".to_owned()));
     }
-    Ok(PaperScheme {
+    let scheme = PaperScheme {
         seed: args.seed,
         births: args.births.unwrap_or(args.preset.map_or(PAPER_BIRTHS, Preset::births)),
         restarts: restarts as u32,
@@ -189,7 +193,8 @@ fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
         target_sae: args.target_sae,
         batch_births: batch_births as u32,
         ..PaperScheme::default()
-    })
+    };
+    args.variation.apply(scheme, args.init.is_some())
 }
 
 fn progress(args: &EvolveArgs) -> ProgressKind {

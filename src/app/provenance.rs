@@ -10,6 +10,7 @@ use super::destination::{Content, Destination};
 use super::job::Job;
 use super::options::EvolveOptions;
 use super::report::Status;
+use super::scheme;
 use crate::archive;
 use crate::error::Result;
 use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
@@ -92,27 +93,27 @@ impl Provenance {
     /// What decides a mosaic.
     fn of_mosaic(options: &EvolveOptions, job: &Job, target_sha256: &str, resized_px: Option<u32>) -> Self {
         let scheme = &options.scheme;
-        Self::new(
-            job,
-            target_sha256,
-            json!({
-                "content": "mosaic",
-                "algorithm": ALGORITHM_VERSION,
-                "tiles": job.fly_count,
-                "init_sha256": job.init.as_ref().map(population_sha256),
-                "scheme": "paper",
-                "seed": scheme.seed,
-                "births_per_run": scheme.births,
-                "batch_births": scheme.batch_births,
-                "restarts": scheme.restarts,
-                "cool_q16": scheme.cool_q16,
-                "on_dry": on_dry_name(scheme.on_dry),
-                "patience": scheme.patience,
-                "target_sae": scheme.target_sae,
-                "time_ms": options.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
-                "output_size_px": resized_px,
-            }),
-        )
+        let mut specific = json!({
+            "content": "mosaic",
+            "algorithm": ALGORITHM_VERSION,
+            "tiles": job.fly_count,
+            "init_sha256": job.init.as_ref().map(population_sha256),
+            "scheme": "paper",
+            "seed": scheme.seed,
+            "births_per_run": scheme.births,
+            "batch_births": scheme.batch_births,
+            "restarts": scheme.restarts,
+            "cool_q16": scheme.cool_q16,
+            "on_dry": on_dry_name(scheme.on_dry),
+            "patience": scheme.patience,
+            "target_sae": scheme.target_sae,
+            "time_ms": options.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
+            "output_size_px": resized_px,
+        });
+        if let Value::Object(specific) = &mut specific {
+            specific.extend(scheme::decisive(scheme));
+        }
+        Self::new(job, target_sha256, specific)
     }
 
     /// What decides the fitted picture.

@@ -46,6 +46,8 @@ pub(super) struct Row {
     pub objective: Option<u64>,
     /// Peak signal-to-noise ratio in dB; none for a perfect likeness, whose ratio is infinite.
     pub psnr: Option<f64>,
+    /// Index of Clark and Evans of the tiles' positions: 1 is random, less is clustered.
+    pub spread: Option<f64>,
     pub tiles: Option<usize>,
     pub births: u64,
     /// Births of the last run, which is the one that the clock or an interrupt cut.
@@ -81,6 +83,7 @@ impl Row {
             sae: None,
             objective: None,
             psnr: None,
+            spread: None,
             tiles: None,
             births: 0,
             births_in_last_run: 0,

@@ -175,6 +175,12 @@ impl Evolution {
         self.scheme.births.saturating_mul(u64::from(self.scheme.restarts) + 1)
     }
 
+    /// Restarts that are made if nothing stops the evolution.
+    #[must_use]
+    pub fn restarts_planned(&self) -> u32 {
+        self.scheme.restarts
+    }
+
     /// Why the evolution ended, if it has.
     #[must_use]
     pub fn stop_reason(&self) -> Option<StopReason> {

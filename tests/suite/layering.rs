@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 /// The modules of the crate, lowest level first. A module imports only modules of lower levels.
 const LEVELS: [&[&str]; 7] = [
     &["error"],
-    &["photo", "output", "model", "metrics"],
+    &["photo", "output", "model", "metrics", "plot"],
     &["archive", "evolve", "shapes", "cpu", "vk"],
     &["gpu"],
     &["engine"],

@@ -7,6 +7,7 @@ mod canary;
 mod cli;
 mod cli_interrupts;
 mod cli_refusals;
+mod cli_scheme;
 mod determinism;
 mod exactness;
 mod files;
@@ -14,6 +15,7 @@ mod layering;
 mod layout;
 mod reference;
 mod scenarios;
+mod schemes;
 mod score;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
