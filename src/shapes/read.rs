@@ -25,7 +25,7 @@ const GZIP_SIGNATURE: [u8; 2] = [0x1F, 0x8B];
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, has more than [`MASK_FILE_BYTES_MAX`], is neither such a picture nor an
-/// SVG, is broken, exceeds the limits of [`photo::read`], has text, pictures or patterns in its SVG, or draws nothing.
+/// SVG, is broken, exceeds the limits of [`photo::read`], has text, pictures, patterns or filters in its SVG, or draws nothing.
 pub fn read(path: &Path) -> Result<Template> {
     let bytes = read_limited(path)?;
     let drawn = if bytes.is_empty() {

@@ -4,15 +4,13 @@
 //! decides a result is the texels of a mask, not the file that they come from.
 
 use resvg::tiny_skia::{Pixmap, Transform};
-use resvg::usvg::{Group, ImageHrefResolver, Node, Options, Tree, roxmltree};
+use resvg::usvg::{ImageHrefResolver, Options, Tree, roxmltree};
 
 use super::template::Ink;
 use crate::model::mask::MASK_SIDE;
 
 /// Bytes at a file's beginning in which the root element is looked for.
 const HEAD_BYTES: usize = 4096;
-/// Longest side of what a filter works on, as a multiple of the drawing's: resvg allocates all of it.
-const FILTER_REACH: f32 = 8.0;
 
 /// Whether these bytes are an SVG: text with the root element `svg`, as far as the beginning shows.
 pub(super) fn is_svg(bytes: &[u8]) -> bool {
@@ -35,14 +33,14 @@ pub(super) fn rasterised(bytes: &[u8]) -> Result<Vec<Ink>, String> {
     let options = Options { image_href_resolver: no_pictures, ..Options::default() };
     let tree = Tree::from_xmltree(&document, &options).map_err(|error| unparsable(error.to_string()))?;
 
-    let (width, height) = (tree.size().width(), tree.size().height());
-    if has_filter_beyond(tree.root(), width.max(height) * FILTER_REACH) {
-        return Err(
-            "a filter in the SVG reaches far beyond the drawing; remove it or give it a smaller region".to_owned()
-        );
+    // resvg limits neither the memory of a pattern nor the parameters of a filter.
+    let costly = [("a pattern", !tree.patterns().is_empty()), ("a filter", !tree.filters().is_empty())];
+    if let Some((what, _)) = costly.iter().find(|(_, is_used)| *is_used) {
+        return Err(format!("the SVG uses {what}, which is not drawn; export it as PNG with a transparent ground"));
     }
 
     let side = MASK_SIDE as f32;
+    let (width, height) = (tree.size().width(), tree.size().height());
     let scale = side / width.max(height);
     let fit = Transform::from_row(scale, 0.0, 0.0, scale, (side - width * scale) / 2.0, (side - height * scale) / 2.0);
     let mut pixmap = Pixmap::new(MASK_SIDE as u32, MASK_SIDE as u32).expect("the side is neither 0 nor huge");
@@ -58,7 +56,7 @@ pub(super) fn rasterised(bytes: &[u8]) -> Result<Vec<Ink>, String> {
 }
 
 /// Refuses elements without which the drawing would not be what its author sees: there are no fonts here, and no
-/// pictures in pictures. Nor is there a limit to the memory that resvg takes for a pattern.
+/// pictures in pictures.
 fn refuse_what_is_not_drawn(document: &roxmltree::Document<'_>) -> Result<(), String> {
     for element in document.descendants().filter(roxmltree::Node::is_element) {
         match element.tag_name().name() {
@@ -67,28 +65,13 @@ fn refuse_what_is_not_drawn(document: &roxmltree::Document<'_>) -> Result<(), St
                             paths"
                     .to_owned());
             }
-            name @ ("image" | "foreignObject" | "pattern") => {
+            name @ ("image" | "foreignObject") => {
                 return Err(format!("the SVG has an element `{name}`, which is not drawn; replace it by paths"));
             }
             _ => {}
         }
     }
     Ok(())
-}
-
-/// Whether a group with a filter has a side longer than `longest`, in the units of the drawing.
-fn has_filter_beyond(group: &Group, longest: f32) -> bool {
-    let bounds = group.abs_layer_bounding_box();
-    // Not `>`: a side that is not a number is no side to allocate.
-    let fits = bounds.width().max(bounds.height()) <= longest;
-    (!group.filters().is_empty() && !fits) || group.children().iter().any(|node| node_has_filter_beyond(node, longest))
-}
-
-fn node_has_filter_beyond(node: &Node, longest: f32) -> bool {
-    let mut found = false;
-    // Clip paths and masks.
-    node.subroots(|group| found |= has_filter_beyond(group, longest));
-    found || matches!(node, Node::Group(group) if has_filter_beyond(group, longest))
 }
 
 /// Brightness of a stored sRGB colour, with the weights of Rec. 709.

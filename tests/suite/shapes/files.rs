@@ -172,7 +172,6 @@ fn an_svg_with_what_cannot_be_drawn_is_refused() {
         ("<g><text>a</text></g>", "the SVG has text, which is not drawn"),
         (r#"<image href="/etc/passwd" width="9" height="9"/>"#, "the SVG has an element `image`"),
         ("<foreignObject/>", "the SVG has an element `foreignObject`"),
-        (r#"<pattern id="p" width="1e6" height="1e6"/>"#, "the SVG has an element `pattern`"),
     ] {
         let found = refusal(&path, drawer.svg(&format!("{rect}{body}")));
         assert!(found.starts_with(reason), "{found}");
@@ -180,22 +179,46 @@ fn an_svg_with_what_cannot_be_drawn_is_refused() {
 }
 
 #[test]
-fn a_filter_is_drawn_unless_its_region_is_absurd() {
+fn an_svg_whose_cost_has_no_limit_is_refused() {
     let drawer = Drawer::new();
-    let body = |width: &str| {
-        format!(
-            r##"<filter id="f" filterUnits="userSpaceOnUse" x="0" y="0" width="{width}" height="{width}"><feGaussianBlur
-            stdDeviation="3"/></filter><g filter="url(#f)"><rect x="20" y="10" width="60" height="30"/></g>"##
-        )
-    };
-    let blurred = drawer.svg(&body("100")).unwrap();
-    let edge = ink(&blurred, 51, 128).alpha;
-    assert!((64..192).contains(&edge) && ink(&blurred, 128, 128).alpha > 250, "{edge}");
-    let found = refusal(&drawer.path("drawing.svg"), drawer.svg(&body("1e7")));
-    assert!(found.starts_with("a filter in the SVG reaches far beyond the drawing"), "{found}");
-    let in_mask = format!(r#"<mask id="m">{}</mask><g mask="url(#m)"><rect width="9" height="9"/></g>"#, body("1e7"));
-    let found = refusal(&drawer.path("drawing.svg"), drawer.svg(&in_mask));
-    assert!(found.starts_with("a filter in the SVG reaches far beyond the drawing"), "{found}");
+    let path = drawer.path("drawing.svg");
+    let filter = r#"<filter id="f"><feGaussianBlur stdDeviation="1e9"/></filter>"#;
+    let pattern =
+        r#"<pattern id="p" width="9e5" height="9e5" patternUnits="userSpaceOnUse"><path d="M0 0h9v9"/></pattern>"#;
+    let rect = |attribute: &str| format!(r#"<rect width="100" height="50" {attribute}/>"#);
+    for (body, reason) in [
+        (format!("{filter}{}", rect(r#"filter="url(#f)""#)), "the SVG uses a filter"),
+        (rect(r#"style="filter: blur(3px)""#), "the SVG uses a filter"),
+        (
+            format!(r#"{filter}<mask id="m">{}</mask>{}"#, rect(r#"filter="url(#f)""#), rect(r#"mask="url(#m)""#)),
+            "the SVG uses a filter",
+        ),
+        (format!("{pattern}{}", rect(r#"fill="url(#p)""#)), "the SVG uses a pattern"),
+    ] {
+        let found = refusal(&path, drawer.svg(&body));
+        assert!(found.starts_with(reason), "{found}");
+    }
+    assert!(drawer.svg(&format!("{filter}{pattern}{}", rect(""))).is_ok(), "what is not used costs nothing");
+    let laughs: String =
+        (1..30).map(|n| format!(r##"<g id="l{n}"><use href="#l{0}"/><use href="#l{0}"/></g>"##, n - 1)).collect();
+    let laughs = format!(r##"<defs><path id="l0" d="M0 0h9v9"/>{laughs}</defs><use href="#l29"/>"##);
+    assert!(refusal(&path, drawer.svg(&laughs)).contains("limit reached"));
+}
+
+#[test]
+fn a_picture_is_shaded_by_the_luma_of_what_a_viewer_shows() {
+    let photos = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/photos");
+    for name in ["rgb.png", "wide_rgb.png", "linear_grey.png", "grey_16_bit.png", "float.tif", "turned.jpg"] {
+        let path = photos.join(name);
+        let photo = smalti::photo::read(&path, &smalti::photo::ReadOptions::default()).unwrap().photo;
+        let stencil = smalti::photo::decode_stencil(&fs::read(&path).unwrap()).unwrap();
+        assert_eq!((stencil.width_px, stencil.height_px), (photo.width_px, photo.height_px), "{name}");
+        for ([r, g, b], [luma, alpha]) in photo.pixels.iter().zip(&stencil.pixels) {
+            let [r, g, b] = [r, g, b].map(|channel| f64::from(*channel));
+            let expected = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+            assert!((expected - f64::from(*luma)).abs() <= 1.01 && *alpha == 255, "{name}: {luma}, not {expected}");
+        }
+    }
 }
 
 #[test]
