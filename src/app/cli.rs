@@ -7,7 +7,9 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::gallery::GalleryArgs;
 use super::look::LookArgs;
+use super::paper::PaperArgs;
 use super::presets::{self, Preset};
 use super::scheme::SchemeArgs;
 use super::score::ScoreArgs;
@@ -66,6 +68,12 @@ pub(super) enum Command {
     /// Thousands of coloured tiles are bred, one death and one birth at a time, until together they look like the
     /// picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Make the figures and tables of the paper from your own pictures
+    ///
+    /// Each is a page with its pictures, plots and tables, to be opened from disk.
+    Paper(PaperArgs),
+    /// Show every mask and every shader on the same pictures
+    Gallery(GalleryArgs),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
     /// Measure how much pictures are like a reference

@@ -45,6 +45,11 @@ impl Curve {
         }
     }
 
+    /// The points, in the order of births.
+    pub(super) fn into_points(self) -> Vec<Point> {
+        self.points
+    }
+
     fn look(&mut self, evolution: &Evolution) {
         let (births, run) = (evolution.outcome().births, evolution.outcome().restarts);
         if births < self.next_birth && run < self.next_run {

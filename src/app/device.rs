@@ -88,12 +88,12 @@ impl Selected {
     ///
     /// # Errors
     /// If the device has no room for the scenes.
-    pub(super) fn open(self, scenes: Vec<Scene>) -> Result<Opened> {
+    pub(super) fn open(&self, scenes: Vec<Scene>) -> Result<Opened> {
         match self {
             Self::Cpu { .. } => Ok(Opened { evaluator: Box::new(CpuEvaluator::new(scenes)), validation_log: None }),
             Self::Vulkan { device, validation_log } => {
-                let evaluator = Box::new(GpuEvaluator::create(&device, scenes)?);
-                Ok(Opened { evaluator, validation_log: Some(validation_log) })
+                let evaluator = Box::new(GpuEvaluator::create(device, scenes)?);
+                Ok(Opened { evaluator, validation_log: Some(Arc::clone(validation_log)) })
             }
         }
     }

@@ -12,8 +12,9 @@ use super::cli::ProgressKind;
 use super::interrupt::Interrupt;
 use super::look::{Dress, Look, LookArgs};
 use super::options;
-use super::paper::{Evolved, Recipe, Study, sheet};
 use super::progress::Progress;
+use super::sheet::sheet;
+use super::study::{Evolved, Recipe, Study};
 use super::{device, report, run, values};
 use crate::error::{Error, Result};
 use crate::evolve::{ColorMode, ColorRule, PaperScheme};
@@ -29,8 +30,8 @@ const SIDE_PX: u32 = 256;
 const FLY_COUNT: usize = 700;
 /// Runs after the first, with steps halved at each: closer to the picture than one long run.
 const RESTARTS: u32 = 3;
-/// Longer side in px that mosaics are drawn at before they are reduced to a cell.
-const DRAWN_PX: u32 = 512;
+/// Samples along each side of a pixel of a cell.
+const SUPERSAMPLING: u32 = 4;
 /// Of the contact sheets, 1 to 100.
 const JPEG_QUALITY: u8 = 85;
 /// Opacity of whole tiles under shaders that are made for translucent tiles.
@@ -103,7 +104,9 @@ fn check_page(page: &Path, force: bool) -> Result<()> {
     let is_foreign = std::fs::read(page).is_ok_and(|bytes| !bytes.starts_with(TITLE.as_bytes()));
     if is_foreign && !force {
         let path = page.display();
-        return Err(Error::Usage(format!("{path} exists and is no gallery; name another folder, or replace it with --force")));
+        return Err(Error::Usage(format!(
+            "{path} exists and is no gallery; name another folder, or replace it with --force"
+        )));
     }
     Ok(())
 }
@@ -123,7 +126,8 @@ fn make_sheet(args: &GalleryArgs, study: &Study<'_>, targets: &[Arc<Target>], sh
     let evolved = study.evolve(&recipes)?;
     let draw = |(recipe, made): (&Recipe, &Evolved)| {
         let population = &made.population;
-        study.draw(recipe, population, &Canvas::scaled(population.width_px, population.height_px, DRAWN_PX))
+        let canvas = Canvas::scaled(population.width_px, population.height_px, SIDE_PX);
+        study.draw(recipe, population, (&canvas, SUPERSAMPLING))
     };
     let photos = recipes.iter().zip(&evolved).map(draw).collect::<Result<Vec<_>>>()?;
     let rows: Vec<Vec<Option<&Photo>>> =

@@ -23,9 +23,11 @@ pub(super) struct Job {
     /// What was ignored in the input, one sentence each.
     pub warnings: Vec<String>,
     pub background: Rgb,
-    /// Colours that the tiles are held to, if any.
-    pub palette: Option<Arc<[Rgb]>>,
     pub fly_count: usize,
+    /// The scheme with what depends on files: the masks that flies wear, and the palette of their colours.
+    pub scheme: PaperScheme,
+    /// How many colours the target was reduced to, if it was.
+    pub color_count: Option<usize>,
     /// The masks that were asked for; none leaves the flies as they are, which is square unless `init` says otherwise.
     pub dress: Option<Dress>,
     /// The population to begin with, if not a random one.
@@ -46,6 +48,12 @@ impl Job {
         let Loaded { mut photo, original_width_px, original_height_px, sha256, warnings } =
             photo::read(&options.input, &reading)?;
         let palette = reduce_colors(&mut photo, &options.colors)?;
+        let dress = dress(options)?;
+        let mut scheme = options.scheme.clone();
+        if let Some(dress) = &dress {
+            scheme.masks.clone_from(&dress.layers_by_run);
+        }
+        scheme.color.palette = palette.map(Palette::new).transpose()?;
         let target = Target::new(photo.width_px, photo.height_px, photo.pixels)?;
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
@@ -61,8 +69,9 @@ impl Job {
             input_sha256: sha256,
             warnings,
             background,
-            palette,
-            dress: dress(options)?,
+            scheme,
+            color_count: if let Colors::Few(count) = options.colors { Some(count) } else { None },
+            dress,
             init,
         })
     }
@@ -71,19 +80,6 @@ impl Job {
     pub(super) fn masks(&self) -> MaskSet {
         let of_init = || self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone());
         self.dress.as_ref().map_or_else(of_init, |dress| dress.masks.clone())
-    }
-
-    /// The scheme with what depends on files: the masks that flies wear, and the palette of their colours.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if the palette has no colours, or too many.
-    pub(super) fn scheme(&self, scheme: &PaperScheme) -> Result<PaperScheme> {
-        let mut scheme = scheme.clone();
-        if let Some(dress) = &self.dress {
-            scheme.masks.clone_from(&dress.layers_by_run);
-        }
-        scheme.color.palette = self.palette.clone().map(Palette::new).transpose()?;
-        Ok(scheme)
     }
 
     /// The lane that the job becomes.
@@ -97,9 +93,9 @@ impl Job {
     }
 
     /// The flies to begin with.
-    pub(super) fn first_flies(&self, scheme: &PaperScheme) -> Vec<Fly> {
-        let random = || first_population(scheme, &self.target, self.fly_count);
-        self.init.as_ref().map_or_else(random, |population| begin_from(scheme, population.flies.clone()))
+    pub(super) fn first_flies(&self) -> Vec<Fly> {
+        let random = || first_population(&self.scheme, &self.target, self.fly_count);
+        self.init.as_ref().map_or_else(random, |population| begin_from(&self.scheme, population.flies.clone()))
     }
 }
 
@@ -113,7 +109,7 @@ fn dress(options: &EvolveOptions) -> Result<Option<Dress>> {
 }
 
 /// Reduces the picture to the colours asked for; returns those that the tiles are held to, too.
-fn reduce_colors(photo: &mut Photo, colors: &Colors) -> Result<Option<Arc<[Rgb]>>> {
+fn reduce_colors(photo: &mut Photo, colors: &Colors) -> Result<Option<Vec<Rgb>>> {
     match colors {
         Colors::Full => Ok(None),
         Colors::Few(count) => {
@@ -124,7 +120,7 @@ fn reduce_colors(photo: &mut Photo, colors: &Colors) -> Result<Option<Arc<[Rgb]>
         Colors::Palette(path) => {
             let palette = photo::read_palette(path)?;
             photo::reduce(photo, &palette);
-            Ok(Some(palette.into()))
+            Ok(Some(palette))
         }
     }
 }

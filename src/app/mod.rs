@@ -9,11 +9,13 @@ mod curve_file;
 mod destination;
 mod device;
 mod devices;
+mod gallery;
 mod interrupt;
 mod job;
 mod look;
 mod memory;
 mod options;
+mod paper;
 mod presets;
 mod progress;
 mod provenance;
@@ -22,6 +24,8 @@ mod result;
 mod run;
 mod scheme;
 mod score;
+mod sheet;
+mod study;
 mod values;
 mod watch;
 
@@ -35,6 +39,8 @@ pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
         cli::Command::Devices(args) => devices::list(args),
+        cli::Command::Paper(args) => paper::make(args),
+        cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
     }
 }

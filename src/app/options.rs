@@ -98,7 +98,7 @@ impl EvolveOptions {
         let sides = (1, u64::from(TARGET_SIDE_MAX_PX));
         let side_px = |flag, px| in_range(flag, px, sides).map(|px| px as u32);
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
-        let threads = args.threads.map(|count| in_range("--threads", count, (1, THREADS_MAX))).transpose()?;
+        let threads = thread_count(args.threads)?;
         let device = device(&args.device)?;
         if args.validate && device == DeviceRequest::Cpu {
             return Err(Error::Usage(
@@ -124,7 +124,7 @@ impl EvolveOptions {
             time_limit: args.time,
             device,
             validation: if args.validate { Validation::On } else { Validation::Off },
-            threads: threads.map(|count| count as usize),
+            threads,
             progress: progress(args),
             verbosity: verbosity(args),
         };
@@ -143,8 +143,13 @@ impl EvolveOptions {
     }
 }
 
+/// The number of CPU threads that was asked for, if any.
+pub(super) fn thread_count(asked: Option<u64>) -> Result<Option<usize>> {
+    asked.map(|count| in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize)).transpose()
+}
+
 /// The device that was asked for; no word at all, as in an empty SMALTI_DEVICE, asks for none.
-fn device(text: &str) -> Result<DeviceRequest> {
+pub(super) fn device(text: &str) -> Result<DeviceRequest> {
     let text = text.trim();
     if text.is_empty() {
         return Ok(DeviceRequest::Auto);

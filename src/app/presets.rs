@@ -34,7 +34,8 @@ impl Preset {
         (1..=12).map(Self::paper)
     }
 
-    fn paper(number: u32) -> Self {
+    /// Scheme `number`, from 1 to 12.
+    pub(super) fn paper(number: u32) -> Self {
         Self {
             number,
             side_px: if (number - 1) % 4 < 2 { 256 } else { 512 },

@@ -14,7 +14,7 @@ use super::scheme;
 use crate::archive;
 use crate::error::Result;
 use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
-use crate::model::{Blend, Population};
+use crate::model::{Blend, MaskSet, Population};
 use crate::photo::{self, Metadata};
 
 /// The program's name in metadata.
@@ -92,7 +92,7 @@ impl Provenances {
 impl Provenance {
     /// What decides a mosaic.
     fn of_mosaic(options: &EvolveOptions, job: &Job, target_sha256: &str, resized_px: Option<u32>) -> Self {
-        let scheme = &options.scheme;
+        let scheme = &job.scheme;
         let mut specific = json!({
             "content": "mosaic",
             "algorithm": ALGORITHM_VERSION,
@@ -112,6 +112,12 @@ impl Provenance {
         });
         if let Value::Object(specific) = &mut specific {
             specific.extend(scheme::decisive(scheme));
+            if let Some(dress) = &job.dress {
+                specific.insert("masks_sha256".to_owned(), masks_sha256(&dress.masks).into());
+            }
+            if let Some(count) = job.color_count {
+                specific.insert("colors".to_owned(), count.into());
+            }
         }
         Self::new(job, target_sha256, specific)
     }
@@ -235,13 +241,24 @@ fn population_sha256(population: &Population) -> String {
         genes.iter().for_each(|gene| hash.update(gene.to_le_bytes()));
         channels.iter().for_each(|channel| hash.update(channel.to_le_bytes()));
     }
-    for mask in population.masks.layers() {
+    hash_masks(&population.masks, &mut hash);
+    hexadecimal(&hash.finalize())
+}
+
+/// SHA-256 over the texels of masks and how they are read, whatever file held them.
+fn masks_sha256(masks: &MaskSet) -> String {
+    let mut hash = Sha256::new();
+    hash_masks(masks, &mut hash);
+    hexadecimal(&hash.finalize())
+}
+
+fn hash_masks(masks: &MaskSet, hash: &mut Sha256) {
+    for mask in masks.layers() {
         hash.update(bytemuck::cast_slice(mask.texels()));
     }
-    if population.masks.blend() == Blend::Translucent {
+    if masks.blend() == Blend::Translucent {
         hash.update(b"translucent");
     }
-    hexadecimal(&hash.finalize())
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {

@@ -7,6 +7,7 @@ use std::time::Duration;
 use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
+use super::device::Selected;
 use super::interrupt::EXIT_INTERRUPTED;
 use super::job::Job;
 use super::options::{EvolveOptions, Verbosity};
@@ -240,6 +241,13 @@ fn write_whole(bytes: &[u8]) -> io::Result<()> {
 /// Prints a line to stderr; if that fails there is nowhere left to say so.
 pub(super) fn say(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Says that the CPU computes, to those who did not ask for it.
+pub(super) fn say_device(selected: &Selected) {
+    if let Selected::Cpu { reason: Some(reason) } = selected {
+        say(&format!("smalti: computing on the CPU, since {reason}"));
+    }
 }
 
 /// Prints a failure.

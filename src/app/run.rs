@@ -93,7 +93,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
 }
 
 /// Gives the CPU twin as many threads as were asked for.
-fn start_threads(count: Option<usize>) -> Result<()> {
+pub(super) fn start_threads(count: Option<usize>) -> Result<()> {
     let Some(count) = count else { return Ok(()) };
     rayon::ThreadPoolBuilder::new()
         .num_threads(count)
@@ -150,9 +150,7 @@ fn say_notes(job: &Job, options: &EvolveOptions, selected: &Selected) {
     for warning in &job.warnings {
         report::say(&format!("smalti: {}: {warning}", options.input.display()));
     }
-    if let Selected::Cpu { reason: Some(reason) } = selected {
-        report::say(&format!("smalti: computing on the CPU, since {reason}"));
-    }
+    report::say_device(selected);
 }
 
 /// Evolves the job, records its curve if one is asked for, and draws its best population; the device is closed before it
@@ -166,9 +164,7 @@ fn evolve_job(
 ) -> Result<Evolved> {
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
-    let scheme = job.scheme(&options.scheme)?;
-    let first_flies = job.first_flies(&scheme);
-    let evolution = Evolution::new(scheme, 0, width_px, height_px, first_flies);
+    let evolution = Evolution::new(job.scheme.clone(), 0, width_px, height_px, job.first_flies());
     let mut engine = Engine::new(evaluator, vec![evolution]);
     let mut watch = Watch::begin(interrupt, options.time_limit, Progress::new(options.progress));
     let ran = engine.run(&mut (&mut watch, &mut *curve));

@@ -65,6 +65,12 @@ impl Shader {
         }
     }
 
+    /// Whether it is made for translucent tiles: its coverage is mostly neither 0 nor 255.
+    #[must_use]
+    pub fn is_translucent(self) -> bool {
+        matches!(self, Self::Soft | Self::Fade | Self::Wash)
+    }
+
     /// What it makes of a template, in one line without a full stop.
     #[must_use]
     pub fn description(self) -> &'static str {

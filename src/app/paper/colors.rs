@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::gimp;
 use super::page::{Cell, Content, FigureTable, Page, PictureTable};
-use super::pictures::{Picture, photo_of, plain_grid};
-use super::study::{Evolved, score};
+use super::pictures::{photo_of, plain_grid};
 use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness};
 use crate::app::presets::Preset;
+use crate::app::study::{Evolved, score};
 use crate::error::{Error, Result};
 use crate::evolve::ColorMode;
 use crate::metrics::edge_pixels;
@@ -113,9 +113,8 @@ fn grid_entry(targets: &[&Target], cell_count: usize) -> Entry {
 }
 
 fn gimp_entry(brush: &str, targets: &[&Target], stroke_count: usize, mask: &Mask) -> Entry {
-    let paint = |target: &&Target| {
-        gimp::paint(&photo_of(target), stroke_count, mask).map_err(|error| error.to_string())
-    };
+    let paint =
+        |target: &&Target| gimp::paint(&photo_of(target), stroke_count, mask).map_err(|error| error.to_string());
     let photos = if gimp::is_installed() {
         targets.par_iter().map(paint).collect()
     } else {

@@ -26,8 +26,9 @@ const SCRIPT: &str = r"(define (smalti-paint in out preset)
 
 /// Whether GIMP is there to be run.
 pub(super) fn is_installed() -> bool {
-    let asked = Command::new(PROGRAM).arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    { asked }.status().is_ok_and(|status| status.success())
+    let mut asked = Command::new(PROGRAM);
+    asked.arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    asked.status().is_ok_and(|status| status.success())
 }
 
 /// `picture` painted with about `stroke_count` strokes of a brush: the coverage of `mask`, as large and as dense as
@@ -98,7 +99,8 @@ impl Files<'_> {
                     // It is given up; whether it could be ended changes nothing.
                     let _ = gimp.kill();
                     let _ = gimp.wait();
-                    let why = outcome.err().map_or("it took more than three minutes".to_owned(), |error| error.to_string());
+                    let why =
+                        outcome.err().map_or("it took more than three minutes".to_owned(), |error| error.to_string());
                     return Err(failed(&why));
                 }
             }

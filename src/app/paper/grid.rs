@@ -4,12 +4,13 @@ use rayon::prelude::*;
 
 use super::page::{Cell, Content, FigureTable, Page, PictureTable};
 use super::pictures::{photo_of, plain_grid};
-use super::study::{Evolved, Recipe, score};
 use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness, spread};
 use crate::app::job::default_fly_count;
 use crate::app::presets::{Preset, Shaders};
+use crate::app::study::{Evolved, score};
 use crate::error::Result;
 use crate::metrics::Score;
+use crate::model::Canvas;
 use crate::photo::Photo;
 
 /// Side in px of a picture in the contact sheet of figure 4.
@@ -25,13 +26,16 @@ pub(super) fn fig3(bench: &Workbench<'_>) -> Result<Page> {
         let mut cells = Vec::new();
         for picture in &bench.pictures {
             let recipe = bench.recipe(picture, preset, &Tiles::default())?;
-            let photo = bench.study.draw(&recipe, &recipe.first())?;
+            let first = recipe.first();
+            let photo = bench.study.draw(&recipe, &first, (&Canvas::evaluation(first.width_px, first.height_px), 1))?;
             let score = score(&recipe.target, &photo)?;
             let file = format!("fig3/{}-{}.png", picture.name, preset.side_px);
             bench.folder.write_picture(&file, &photo)?;
             cells.push(cell(&file, &score));
             let size = format!("{}x{}", recipe.target.width_px(), recipe.target.height_px());
-            figures.rows.push([vec![picture.name.clone(), size, recipe.fly_count.to_string()], likeness(&score)].concat());
+            figures
+                .rows
+                .push([vec![picture.name.clone(), size, recipe.fly_count.to_string()], likeness(&score)].concat());
         }
         rows.push((format!("{} px", preset.side_px), cells));
     }
@@ -62,21 +66,23 @@ pub(super) fn fig4(bench: &Workbench<'_>) -> Result<Page> {
         .map(|(name, photo)| (format!("fig4/original/{name}.png"), photo))
         .chain(presets.iter().enumerate().flat_map(|(scheme, preset)| {
             let (names, evolved) = (&names, &evolved);
-            row(scheme).zip(names).map(move |(k, name)| (format!("fig4/{}/{name}.png", preset.name()), &evolved[k].photo))
+            row(scheme)
+                .zip(names)
+                .map(move |(k, name)| (format!("fig4/{}/{name}.png", preset.name()), &evolved[k].photo))
         }))
         .collect();
     bench.write_pictures(&files)?;
 
     let mut rows = vec![("original".to_owned(), names.iter().map(|name| original_cell("fig4", name)).collect())];
     for (scheme, preset) in presets.iter().enumerate() {
-        let cells = row(scheme).zip(&names).map(|(k, name)| {
-            cell(&format!("fig4/{}/{name}.png", preset.name()), &evolved[k].score)
-        });
+        let cells = row(scheme)
+            .zip(&names)
+            .map(|(k, name)| cell(&format!("fig4/{}/{name}.png", preset.name()), &evolved[k].score));
         rows.push((describe(*preset), cells.collect()));
     }
     let mut sheet_rows = vec![originals.iter().map(Some).collect::<Vec<_>>()];
     sheet_rows.extend((0..presets.len()).map(|scheme| row(scheme).map(|k| Some(&evolved[k].photo)).collect()));
-    bench.folder.write_picture("fig4/sheet.png", &super::sheet(&sheet_rows, SHEET_CELL_PX)?)?;
+    bench.folder.write_picture("fig4/sheet.png", &crate::app::sheet::sheet(&sheet_rows, SHEET_CELL_PX)?)?;
 
     let mut page = Page::new(
         "Figure 4: the 12 schemes",
@@ -84,7 +90,7 @@ pub(super) fn fig4(bench: &Workbench<'_>) -> Result<Page> {
          as it was evolved towards.",
     );
     page.push("Mosaics", Content::Pictures(PictureTable { head: names, rows }));
-    let table = fig4_figures(bench, &presets, &recipes, &evolved)?;
+    let table = fig4_figures(bench, &presets, &evolved)?;
     page.push("Likeness", Content::Figures(bench.write_table("fig4.csv", table)?));
     Ok(page)
 }
@@ -110,34 +116,32 @@ fn describe(preset: Preset) -> String {
 }
 
 /// Per scheme and picture the likeness, and that of the plainest mosaic with as many tiles.
-fn fig4_figures(
-    bench: &Workbench<'_>,
-    presets: &[Preset],
-    recipes: &[Recipe],
-    evolved: &[Evolved],
-) -> Result<FigureTable> {
+fn fig4_figures(bench: &Workbench<'_>, presets: &[Preset], evolved: &[Evolved]) -> Result<FigureTable> {
     let mut table = FigureTable { head: heads(&["scheme", "picture"]), rows: Vec::new() };
     table.head.extend(heads(&LIKENESS));
     table.head.extend(heads(&["SAE to the full-colour picture", "births", "Clark-Evans index"]));
-    for (k, (recipe, evolved)) in recipes.iter().zip(evolved).enumerate() {
+    for (k, evolved) in evolved.iter().enumerate() {
         let (picture, preset) = (&bench.pictures[k / presets.len()], presets[k % presets.len()]);
         let full = picture.target(preset.side_px, None)?;
         let to_full = if preset.color_count.is_some() { score(&full, &evolved.photo)? } else { evolved.score };
         let mut row = vec![preset.name(), picture.name.clone()];
         row.extend(likeness(&evolved.score));
         row.extend([to_full.difference.sae().to_string(), evolved.births.to_string(), spread(evolved)]);
-        debug_assert_eq!(recipe.scheme.seed, bench.seed);
         table.rows.push(row);
     }
-    let grids: Vec<(u32, usize)> = [256, 512].iter().flat_map(|&px| (0..bench.pictures.len()).map(move |p| (px, p))).collect();
-    let rows: Vec<Result<Vec<String>>> = grids.par_iter().map(|&(side_px, picture)| {
-        let picture = &bench.pictures[picture];
-        let (cell_count, score) = grid_score(picture, side_px)?;
-        let mut row = vec![format!("plain grid of {cell_count}, {side_px} px"), picture.name.clone()];
-        row.extend(likeness(&score));
-        row.extend([score.difference.sae().to_string(), "0".to_owned(), "none".to_owned()]);
-        Ok(row)
-    }).collect();
+    let grids: Vec<(u32, usize)> =
+        [256, 512].iter().flat_map(|&px| (0..bench.pictures.len()).map(move |p| (px, p))).collect();
+    let rows: Vec<Result<Vec<String>>> = grids
+        .par_iter()
+        .map(|&(side_px, picture)| {
+            let picture = &bench.pictures[picture];
+            let (cell_count, score) = grid_score(picture, side_px)?;
+            let mut row = vec![format!("plain grid of {cell_count}, {side_px} px"), picture.name.clone()];
+            row.extend(likeness(&score));
+            row.extend([score.difference.sae().to_string(), "0".to_owned(), "none".to_owned()]);
+            Ok(row)
+        })
+        .collect();
     for row in rows {
         table.rows.push(row?);
     }

@@ -1,9 +1,9 @@
 //! Figures 7 and 8: the templates of tiles, and what shaders, sides and angles make of a picture.
 
 use super::page::{Cell, Content, FigureTable, Page, PictureTable};
-use super::study::Recipe;
 use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness};
 use crate::app::presets::Preset;
+use crate::app::study::Recipe;
 use crate::error::Result;
 use crate::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE, Texel, shaded};
 use crate::model::operators::Rotation;

@@ -11,8 +11,6 @@ mod looks;
 mod page;
 mod pictures;
 mod restarts;
-mod sheet;
-mod study;
 mod tables;
 mod workbench;
 
@@ -26,15 +24,13 @@ use super::cli::ProgressKind;
 use super::interrupt::Interrupt;
 use super::options::{self, Overwrite};
 use super::progress::Progress;
+use super::study::Study;
 use super::{device, report, run, values};
 use crate::error::{Error, Result};
 use crate::vk::Validation;
 use folder::Folder;
 use page::{Content, Page};
-use study::Study;
 use workbench::Workbench;
-
-pub(super) use sheet::sheet;
 
 const EXAMPLES: &str = "\
 Examples:

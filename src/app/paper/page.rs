@@ -183,7 +183,9 @@ mod tests {
         let table = PictureTable { head: vec!["x".to_owned()], rows: vec![("<row>".to_owned(), vec![cell])] };
         page.push("pictures", Content::Pictures(table));
         let html = page.to_html("smalti paper fig4");
-        assert!(!html.contains("<script>") && !html.contains("<b>") && !html.contains("<i>") && !html.contains("<row>"));
+        assert!(
+            !html.contains("<script>") && !html.contains("<b>") && !html.contains("<i>") && !html.contains("<row>")
+        );
         let table = FigureTable { head: vec!["a".to_owned()], rows: vec![vec!["1,\"2".to_owned()]] };
         assert_eq!(table.to_csv(), b"a\n\"1,\"\"2\"\n");
     }

@@ -1,9 +1,9 @@
 //! Figure 5: restarts, and the curve of global fitness.
 
 use super::page::{Cell, Content, FigureTable, Page, PictureTable};
-use super::study::{Evolved, Recipe};
 use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness, spread};
 use crate::app::presets::Preset;
+use crate::app::study::{Evolved, Recipe};
 use crate::error::Result;
 use crate::plot::{Mark, Plot, Scale, Series};
 
@@ -24,7 +24,11 @@ pub(super) fn fig5(bench: &Workbench<'_>) -> Result<Page> {
             recipe.scheme.cool_q16 = cool_q16;
             recipe
         };
-        Ok(COOLINGS.iter().flat_map(|&(_, _, cool)| (0..=RESTARTS).map(move |r| (cool, r))).map(|(c, r)| restarted(c, r)).collect())
+        Ok(COOLINGS
+            .iter()
+            .flat_map(|&(_, _, cool)| (0..=RESTARTS).map(move |r| (cool, r)))
+            .map(|(c, r)| restarted(c, r))
+            .collect())
     })?;
     let evolved = bench.study.evolve(&recipes)?;
     let of = |picture: usize, cooling: usize, run: u32| {

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use super::folder::Folder;
 use super::page::{Cell, FigureTable};
 use super::pictures::Picture;
-use super::study::{Evolved, Recipe, Study};
 use crate::app::job::default_fly_count;
 use crate::app::look::{Dress, Look, LookArgs};
 use crate::app::presets::Preset;
+use crate::app::study::{Evolved, Recipe, Study};
 use crate::error::Result;
 use crate::evolve::PaperScheme;
 use crate::metrics::Score;
@@ -64,10 +64,7 @@ impl Workbench<'_> {
     }
 
     /// The recipes of every picture, picture by picture.
-    pub(super) fn recipes_of_all(
-        &self,
-        mut make: impl FnMut(&Picture) -> Result<Vec<Recipe>>,
-    ) -> Result<Vec<Recipe>> {
+    pub(super) fn recipes_of_all(&self, mut make: impl FnMut(&Picture) -> Result<Vec<Recipe>>) -> Result<Vec<Recipe>> {
         Ok(self.pictures.iter().map(&mut make).collect::<Result<Vec<_>>>()?.concat())
     }
 

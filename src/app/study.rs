@@ -1,21 +1,20 @@
-//! The evolutions that a figure needs, made side by side: on the CPU one per thread, on a Vulkan device one after the
+//! Evolutions of several pictures, made side by side: on the CPU one per thread, on a Vulkan device one after the
 //! other.
 
 use std::sync::Arc;
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use crate::app::device::{Opened, Selected};
-use crate::app::interrupt::Interrupt;
-use crate::app::progress::{Progress, Standing};
+use super::curve::{Curve, Point};
+use super::device::{Opened, Selected};
+use super::interrupt::Interrupt;
+use super::progress::{Progress, Standing};
 use crate::engine::{Engine, Observer, side_by_side};
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, PaperScheme, Spread, StopReason, first_population};
 use crate::metrics::{Picture, Reference, Score};
 use crate::model::{Canvas, MaskSet, Population, Scene, Target};
 use crate::photo::Photo;
-
-use super::curve::{Curve, Recorder};
 
 /// Generations between two looks at the clock: some milliseconds.
 const STRIDE: u32 = 256;
@@ -38,9 +37,8 @@ pub(super) struct Evolved {
     pub births: u64,
     /// Of the best population.
     pub spread: Spread,
-    pub evolve_time: Duration,
-    /// SAE and spread over births.
-    pub curve: Curve,
+    /// Fitness and spread over births.
+    pub curve: Vec<Point>,
 }
 
 impl Recipe {
@@ -114,34 +112,37 @@ impl<'a> Study<'a> {
         if self.interrupt.is_requested() {
             return Err(Error::Interrupted);
         }
-        let began = Instant::now();
         let Opened { evaluator, .. } = self.device.open(vec![recipe.scene()])?;
         let (width_px, height_px) = (recipe.target.width_px(), recipe.target.height_px());
         let flies = recipe.first().flies;
         let evolution = Evolution::new(recipe.scheme.clone(), 0, width_px, height_px, flies);
         let mut engine = Engine::new(evaluator, vec![evolution]);
-        let mut watch = Watch { study: self, recorder: Recorder::new(&recipe.scheme), until_look: 0, births_told: 0 };
-        engine.run(&mut watch)?;
-        let curve = watch.recorder.finish(&engine.evolutions()[0]);
+        let mut watch = Watch { study: self, until_look: 0, births_told: 0 };
+        let mut curve = Curve::new(0);
+        engine.run(&mut (&mut watch, &mut curve))?;
+        curve.finish(engine.evolutions());
         watch.tell(&engine.evolutions()[0]);
         let evolution = &engine.evolutions()[0];
         if evolution.stop_reason() == Some(StopReason::Interrupted) {
             return Err(Error::Interrupted);
         }
-        let evolve_time = began.elapsed();
         let births = evolution.outcome().births;
         let population = recipe.population(evolution.best_flies().to_vec());
         let spread = Spread::of(&population.flies, width_px, height_px);
         let mosaic = engine.evaluator().draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
         let photo = Photo { width_px, height_px, pixels: mosaic.pixels };
         let score = score(&recipe.target, &photo)?;
-        Ok(Evolved { population, photo, score, births, spread, evolve_time, curve })
+        Ok(Evolved { population, photo, score, births, spread, curve: curve.into_points() })
     }
 
-    /// Draws a population on its evaluation canvas.
-    pub(super) fn draw(&self, recipe: &Recipe, population: &Population) -> Result<Photo> {
-        let canvas = Canvas::evaluation(population.width_px, population.height_px);
-        let mosaic = self.device.open(vec![recipe.scene()])?.evaluator.draw(population, &canvas, 1)?;
+    /// Draws a population of `recipe` on a canvas, each pixel the mean of `supersampling`² samples.
+    pub(super) fn draw(
+        &self,
+        recipe: &Recipe,
+        population: &Population,
+        (canvas, supersampling): (&Canvas, u32),
+    ) -> Result<Photo> {
+        let mosaic = self.device.open(vec![recipe.scene()])?.evaluator.draw(population, canvas, supersampling)?;
         Ok(Photo { width_px: mosaic.width_px, height_px: mosaic.height_px, pixels: mosaic.pixels })
     }
 
@@ -168,7 +169,6 @@ pub(super) fn score(target: &Target, photo: &Photo) -> Result<Score> {
 /// Watches one evolution of a study.
 struct Watch<'a> {
     study: &'a Study<'a>,
-    recorder: Recorder,
     until_look: u32,
     births_told: u64,
 }
@@ -195,7 +195,6 @@ impl Watch<'_> {
 
 impl Observer for Watch<'_> {
     fn after_generation(&mut self, evolutions: &[Evolution]) -> Option<StopReason> {
-        self.recorder.note(&evolutions[0]);
         if self.until_look == 0 {
             self.until_look = STRIDE;
             self.tell(&evolutions[0]);

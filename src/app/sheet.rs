@@ -10,7 +10,7 @@ const PAPER: [u8; 3] = [128; 3];
 
 /// The pictures of `rows` in cells of `cell_px` x `cell_px`, each reduced to fit and centred in its cell; a missing one
 /// leaves its cell empty. There must be a picture.
-pub(in crate::app) fn sheet(rows: &[Vec<Option<&Photo>>], cell_px: u32) -> Result<Photo> {
+pub(super) fn sheet(rows: &[Vec<Option<&Photo>>], cell_px: u32) -> Result<Photo> {
     let column_count = rows.iter().map(Vec::len).max().unwrap_or_default() as u32;
     let side = |cells: u32| cells * (cell_px + GAP_PX) + GAP_PX;
     let (width_px, height_px) = (side(column_count), side(rows.len() as u32));
