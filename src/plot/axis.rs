@@ -17,11 +17,11 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// The scale that shows these values best: logarithmic if all are at least 1 and they span a factor of ten or more.
+    /// The scale that shows these values best: logarithmic if all are at least 1 and they span a factor of five or more.
     #[must_use]
     pub fn fitting(values: impl Iterator<Item = f64>) -> Self {
         let (least, most) = extremes(values);
-        if least >= 1.0 && most >= 10.0 * least { Self::Log } else { Self::Linear }
+        if least >= 1.0 && most >= 5.0 * least { Self::Log } else { Self::Linear }
     }
 }
 
@@ -150,8 +150,8 @@ mod tests {
 
     #[test]
     fn values_of_many_sizes_ask_for_a_log_scale() {
-        assert_eq!(Scale::fitting([2e6, 2.1e7].into_iter()), Scale::Log);
-        assert_eq!(Scale::fitting([3e6, 2.1e7].into_iter()), Scale::Linear);
+        assert_eq!(Scale::fitting([4e6, 2.1e7].into_iter()), Scale::Log);
+        assert_eq!(Scale::fitting([5e6, 2.1e7].into_iter()), Scale::Linear);
         assert_eq!(Scale::fitting([0.0, 2.1e7].into_iter()), Scale::Linear);
     }
 

@@ -19,6 +19,7 @@ pub const SIZE_PX: (u32, u32) = (960, 540);
 const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(225, 225, 225);
 const MARK: RGBColor = RGBColor(150, 150, 150);
+const MARK_INK: RGBColor = RGBColor(100, 100, 100);
 const SERIES: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -41,7 +42,7 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
-/// A vertical line with a label at its top.
+/// A vertical line with a label above it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
     /// Where it is.
@@ -88,9 +89,11 @@ impl Plot {
         let told = |error: &dyn std::fmt::Display| error.to_string();
         let area = SVGBackend::with_string(text, SIZE_PX).into_drawing_area();
         area.fill(&WHITE).map_err(|error| told(&error))?;
-        let mut chart = ChartBuilder::on(&area)
-            .caption(&self.title, (FONT, 22).into_font().color(&INK))
+        let title = (FONT, 22).into_font().color(&INK);
+        let below_title = area.margin(12, 0, 0, 0).titled(&self.title, title).map_err(|error| told(&error))?;
+        let mut chart = ChartBuilder::on(&below_title)
             .margin(14)
+            .margin_top(24)
             .margin_right(30)
             .x_label_area_size(46)
             .y_label_area_size(78)
@@ -108,14 +111,15 @@ impl Plot {
             .y_desc(&self.y_label)
             .draw()
             .map_err(|error| told(&error))?;
+        let (_, rows) = chart.plotting_area().get_pixel_range();
+        let places = self.marks.iter().map(|mark| chart.backend_coord(&(mark.x, 1.0)).0);
+        let marks: Vec<(i32, &str)> = places.zip(self.marks.iter().map(|mark| mark.label.as_str())).collect();
+        draw_marks(&area, &marks, rows).map_err(|error| told(&error))?;
         for (series, color) in self.series.iter().zip(SERIES.iter().cycle()) {
             let line = LineSeries::new(series.points.iter().copied(), color.stroke_width(2));
             let drawn = chart.draw_series(line).map_err(|error| told(&error))?;
             drawn.label(&series.label).legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], color.stroke_width(3)));
         }
-        let (columns, rows) = chart.plotting_area().get_pixel_range();
-        let places = self.marks.iter().map(|mark| chart.backend_coord(&(mark.x, 1.0)).0);
-        let marks: Vec<(i32, &str)> = places.zip(self.marks.iter().map(|mark| mark.label.as_str())).collect();
         if self.series.len() > 1 {
             chart
                 .configure_series_labels()
@@ -127,28 +131,26 @@ impl Plot {
                 .draw()
                 .map_err(|error| told(&error))?;
         }
-        drop(chart);
-        draw_marks(&area, &marks, (columns.end, rows)).map_err(|error| told(&error))?;
         area.present().map_err(|error| told(&error))
     }
 }
 
-/// Draws marks at their columns, from the top to the bottom of the plotting area.
+/// Draws marks at their columns across the rows of the plotting area, and their labels above it.
 fn draw_marks<B: DrawingBackend>(
     area: &DrawingArea<B, plotters::coord::Shift>,
     marks: &[(i32, &str)],
-    (right, rows): (i32, std::ops::Range<i32>),
+    rows: std::ops::Range<i32>,
 ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
-    let style = (FONT, 13).into_font().color(&MARK).pos(Pos::new(HPos::Left, VPos::Top));
+    let style = (FONT, 13).into_font().color(&MARK_INK).pos(Pos::new(HPos::Center, VPos::Bottom));
     let mut free_from = i32::MIN;
     for &(x, label) in marks {
         for top in rows.clone().step_by(8) {
             area.draw(&PathElement::new([(x, top), (x, (top + 4).min(rows.end))], MARK))?;
         }
-        let end = x + 4 + label.len() as i32 * CHARACTER_PX;
-        if x >= free_from && end <= right {
-            area.draw(&Text::new(label, (x + 4, rows.start + 2), style.clone()))?;
-            free_from = end;
+        let half_px = label.len() as i32 * CHARACTER_PX / 2;
+        if x - half_px >= free_from {
+            area.draw(&Text::new(label, (x, rows.start - 4), style.clone()))?;
+            free_from = x + half_px;
         }
     }
     Ok(())
