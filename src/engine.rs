@@ -9,6 +9,9 @@ use crate::model::{Change, Evaluator, Fly};
 
 /// Watches an evolution and may end it.
 pub trait Observer {
+    /// Called once, when the first populations are evaluated and nothing was born yet.
+    fn before_first_generation(&mut self, _evolutions: &[Evolution]) {}
+
     /// Called after every generation; a reason ends all evolutions.
     fn after_generation(&mut self, evolutions: &[Evolution]) -> Option<StopReason>;
 }
@@ -64,6 +67,7 @@ impl Engine {
         for evolution in &mut self.evolutions {
             evolution.absorb(&[], self.evaluator.evaluation(evolution.lane()).sae);
         }
+        observer.before_first_generation(&self.evolutions);
         while self.generation()? {
             if let Some(reason) = observer.after_generation(&self.evolutions) {
                 self.evolutions.iter_mut().for_each(|evolution| evolution.stop(reason));
