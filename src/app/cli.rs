@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::timelapse::TimelapseArgs;
 use super::{report, values};
 use crate::model::Rgb;
 
@@ -61,6 +62,10 @@ pub(super) enum Command {
     /// Thousands of coloured tiles are bred, one death and one birth at a time, until together they look like the
     /// picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Turn the snapshots of an evolution into an animation
+    ///
+    /// Draws what `smalti evolve --save-run DIR` kept, in order and at any size.
+    Timelapse(Box<TimelapseArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
 }
@@ -89,6 +94,12 @@ pub(super) struct EvolveArgs {
     /// Also write the picture that was evolved towards, fitted to size, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
+    /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub save_run: Option<PathBuf>,
+    /// Births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 200th of all]
+    #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
+    pub save_every: Option<u64>,
     /// Replace outputs that are not smalti's or were made with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,

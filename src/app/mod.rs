@@ -13,9 +13,12 @@ mod memory;
 mod options;
 mod progress;
 mod provenance;
+mod recorder;
 mod report;
 mod result;
 mod run;
+mod snapshots;
+mod timelapse;
 mod values;
 mod watch;
 
@@ -28,6 +31,7 @@ pub use cli::Cli;
 pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
+        cli::Command::Timelapse(args) => timelapse::make(args),
         cli::Command::Devices(args) => devices::list(args),
     }
 }

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
 use super::destination::Destination;
+use super::snapshots::SaveRun;
 use crate::error::{Error, Result};
 use crate::evolve::{OnDry, PaperScheme};
 use crate::model::Rgb;
@@ -17,7 +18,7 @@ const RESTARTS_MAX: u64 = 1_000_000;
 /// Least factor of the mutation steps: it is kept in 65,536ths and must not become 0.
 const COOL_MIN: f64 = 0.00001;
 /// Most CPU threads.
-const THREADS_MAX: u64 = 1_024;
+pub(super) const THREADS_MAX: u64 = 1_024;
 
 /// What to do about outputs that exist already and are not what the same command would write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +48,8 @@ pub(super) struct EvolveOptions {
     pub input: PathBuf,
     pub outputs: Vec<Destination>,
     pub save_target: Option<Destination>,
+    /// Where to keep snapshots.
+    pub save_run: Option<SaveRun>,
     /// Longer side of the written picture in px; `None` writes it as evolved.
     pub output_long_side_px: Option<u32>,
     pub overwrite: Overwrite,
@@ -87,6 +90,7 @@ impl EvolveOptions {
             input: args.input.clone(),
             outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
             save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
+            save_run: args.save_run.as_deref().map(|folder| SaveRun::new(folder, args.save_every)).transpose()?,
             output_long_side_px: args.output_size.map(|px| side_px("--output-size", px)).transpose()?,
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
             mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
@@ -115,7 +119,7 @@ impl EvolveOptions {
 }
 
 /// The device that was asked for; no word at all, as in an empty SMALTI_DEVICE, asks for none.
-fn device(text: &str) -> Result<DeviceRequest> {
+pub(super) fn device(text: &str) -> Result<DeviceRequest> {
     let text = text.trim();
     if text.is_empty() {
         return Ok(DeviceRequest::Auto);
@@ -167,7 +171,8 @@ fn verbosity(args: &EvolveArgs) -> Verbosity {
     }
 }
 
-fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
+/// `value`, if it lies between the bounds, both included.
+pub(super) fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
     if (least..=most).contains(&value) {
         Ok(value)
     } else if most == u64::MAX {

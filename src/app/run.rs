@@ -11,14 +11,15 @@ use super::job::Job;
 use super::options::{EvolveOptions, Mode, Verbosity};
 use super::progress::Progress;
 use super::provenance::{Ending, Provenances};
+use super::recorder::Recorder;
 use super::report::{self, Row, Status};
 use super::result::Evolved;
-use super::watch::Watch;
+use super::watch::{Watch, Watchers};
 use super::{destination, memory, result};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
-use crate::model::{Canvas, Population};
+use crate::model::Canvas;
 use crate::vk::ValidationLog;
 
 /// Evolves one picture and reports about it; the exit code of the process.
@@ -62,17 +63,31 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     if options.mode == Mode::DryRun {
         row.status = Status::Planned;
         row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
+        row.output.extend(options.save_run.iter().map(|save_run| save_run.folder.display().to_string()));
         report::print_plan(row, options, &job, memory_bytes);
         return Ok(());
     }
 
-    let evolved = evolve_job(options, &job, selected, &interrupt, row)?;
+    let recorder = options.save_run.as_ref().map(|save_run| {
+        let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
+        Recorder::begin(
+            save_run,
+            births_planned,
+            job.population(Vec::new()),
+            provenances.population.snapshot_metadata(),
+        )
+    });
+    let mut watchers = Watchers { interrupt: &interrupt, recorder: recorder.transpose()? };
+    let evolved = evolve_job(options, &job, selected, &mut watchers, row)?;
+    let recorder = watchers.recorder;
     let began = Instant::now();
     let status = evolved.ending.status;
     let outputs = outputs_to_write(options, &provenances, &evolved.ending);
     let mut files = result::encode(&outputs, evolved, &provenances)?;
     files.extend(result::encode_target(options, &job, &provenances.target)?);
     result::write(&files, &mut interrupt, &mut row.output)?;
+    // A broken record of the course is no reason to lose its result.
+    row.output.extend(recorder.map(Recorder::outcome).transpose()?);
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {
@@ -82,7 +97,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
 }
 
 /// Gives the CPU twin as many threads as were asked for.
-fn start_threads(count: Option<usize>) -> Result<()> {
+pub(super) fn start_threads(count: Option<usize>) -> Result<()> {
     let Some(count) = count else { return Ok(()) };
     rayon::ThreadPoolBuilder::new()
         .num_threads(count)
@@ -115,7 +130,11 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
 fn check_replaceable(options: &EvolveOptions, provenances: &Provenances) -> Result<()> {
     let outputs = options.outputs.iter().map(|output| (output, provenances.of_output(output).key()));
     let targets = options.save_target.iter().map(|output| (output, provenances.target.key()));
-    outputs.chain(targets).try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))
+    outputs
+        .chain(targets)
+        .try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))?;
+    let save_run = options.save_run.iter();
+    save_run.map(|save_run| save_run.check(provenances.population.key(), options.overwrite)).collect()
 }
 
 /// The outputs without those that hold a better result of the same command.
@@ -151,7 +170,7 @@ fn evolve_job(
     options: &EvolveOptions,
     job: &Job,
     selected: Selected,
-    interrupt: &Interrupt,
+    watchers: &mut Watchers<'_>,
     row: &mut Row,
 ) -> Result<Evolved> {
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
@@ -159,20 +178,14 @@ fn evolve_job(
     let first_flies = job.first_flies(options.scheme.seed);
     let evolution = Evolution::new(options.scheme.clone(), 0, width_px, height_px, first_flies);
     let mut engine = Engine::new(evaluator, vec![evolution]);
-    let mut watch = Watch::begin(interrupt, options.time_limit, Progress::new(options.progress));
+    let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress));
     let ran = engine.run(&mut watch);
-    row.evolve_ms = report::milliseconds(watch.finish());
+    row.evolve_ms = report::milliseconds(watch.finish(&engine.evolutions()[0]));
     ran?;
     let evolution = &engine.evolutions()[0];
     row.note_evolution(evolution);
     let ending = Ending::of(evolution);
-    let population = Population {
-        width_px,
-        height_px,
-        background: job.background,
-        masks: job.masks(),
-        flies: evolution.best_flies().to_vec(),
-    };
+    let population = job.population(evolution.best_flies().to_vec());
     let evolved = result::draw(engine.evaluator(), options, population, ending)?;
     row.psnr = report::psnr_db(&evolved.mosaic, &job.target);
     drop(engine);

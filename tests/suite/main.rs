@@ -17,7 +17,9 @@ mod scenarios;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
 mod shaders_fresh;
+mod snapshots;
 mod spirv;
+mod timelapse;
 mod vulkan;
 mod vulkan_failures;
 mod workshop;
