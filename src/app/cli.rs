@@ -13,6 +13,7 @@ use super::paper::PaperArgs;
 use super::presets::{self, Preset};
 use super::scheme::SchemeArgs;
 use super::score::ScoreArgs;
+use super::timelapse::TimelapseArgs;
 use super::values::ColorCount;
 use super::{report, values};
 use crate::model::Rgb;
@@ -74,6 +75,9 @@ pub(super) enum Command {
     Paper(PaperArgs),
     /// Show every mask and every shader on the same pictures
     Gallery(GalleryArgs),
+    /// Turn the snapshots of an evolution into an animation
+    /// Draws what `smalti evolve --save-run DIR` kept, in order and at any size.
+    Timelapse(Box<TimelapseArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
     /// Measure how much pictures are like a reference
@@ -110,6 +114,12 @@ pub(super) struct EvolveArgs {
     /// Also write how the error fell, birth by birth, as a table (.csv) or a plot (.svg); may repeat
     #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
     pub curves: Vec<PathBuf>,
+    /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub save_run: Option<PathBuf>,
+    /// Births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 200th of all]
+    #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
+    pub save_every: Option<u64>,
     /// Replace outputs that are not smalti's or were made with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,

@@ -82,6 +82,17 @@ impl Job {
         self.dress.as_ref().map_or_else(of_init, |dress| dress.masks.clone())
     }
 
+    /// These flies as a population of this picture.
+    pub(super) fn population(&self, flies: Vec<Fly>) -> Population {
+        Population {
+            width_px: self.target.width_px(),
+            height_px: self.target.height_px(),
+            background: self.background,
+            masks: self.masks(),
+            flies,
+        }
+    }
+
     /// The lane that the job becomes.
     pub(super) fn scene(&self) -> Scene {
         Scene {

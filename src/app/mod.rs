@@ -19,13 +19,16 @@ mod paper;
 mod presets;
 mod progress;
 mod provenance;
+mod recorder;
 mod report;
 mod result;
 mod run;
 mod scheme;
 mod score;
 mod sheet;
+mod snapshots;
 mod study;
+mod timelapse;
 mod values;
 mod watch;
 
@@ -38,6 +41,7 @@ pub use cli::Cli;
 pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
+        cli::Command::Timelapse(args) => timelapse::make(args),
         cli::Command::Devices(args) => devices::list(args),
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),

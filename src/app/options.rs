@@ -8,6 +8,7 @@ use super::curve_file::CurveFile;
 use super::destination::Destination;
 use super::look::Look;
 use super::presets::Preset;
+use super::snapshots::SaveRun;
 use super::values::ColorCount;
 use crate::error::{Error, Result};
 use crate::evolve::scheme::PAPER_BIRTHS;
@@ -22,7 +23,7 @@ const RESTARTS_MAX: u64 = 1_000_000;
 /// Least factor of the mutation steps: it is kept in 65,536ths and must not become 0.
 const COOL_MIN: f64 = 0.00001;
 /// Most CPU threads.
-const THREADS_MAX: u64 = 1_024;
+pub(super) const THREADS_MAX: u64 = 1_024;
 
 /// What to do about outputs that exist already and are not what the same command would write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +68,8 @@ pub(super) struct EvolveOptions {
     pub save_target: Option<Destination>,
     /// Where the curve of the evolution goes.
     pub curves: Vec<CurveFile>,
+    /// Where to keep snapshots.
+    pub save_run: Option<SaveRun>,
     /// Longer side of the written picture in px; `None` writes it as evolved.
     pub output_long_side_px: Option<u32>,
     pub overwrite: Overwrite,
@@ -111,6 +114,7 @@ impl EvolveOptions {
             outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
             save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
             curves: args.curves.iter().map(|path| CurveFile::new(path)).collect::<Result<_>>()?,
+            save_run: args.save_run.as_deref().map(|folder| SaveRun::new(folder, args.save_every)).transpose()?,
             output_long_side_px: args.output_size.map(|px| side_px("--output-size", px)).transpose()?,
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
             mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
@@ -214,7 +218,8 @@ fn verbosity(args: &EvolveArgs) -> Verbosity {
     }
 }
 
-fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
+/// `value`, if it lies between the bounds, both included.
+pub(super) fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
     if (least..=most).contains(&value) {
         Ok(value)
     } else if most == u64::MAX {

@@ -18,9 +18,9 @@ use crate::model::{Blend, MaskSet, Population};
 use crate::photo::{self, Metadata};
 
 /// The program's name in metadata.
-const SOFTWARE: &str = "smalti";
+pub(super) const SOFTWARE: &str = "smalti";
 /// Keyword of the text chunk or comment that holds the metadata as JSON.
-const KEYWORD: &str = "smalti";
+pub(super) const KEYWORD: &str = "smalti";
 /// What the header of a population file already tells.
 const HEADER_KEYS: [&str; 4] = ["width_px", "height_px", "background", "blend"];
 
@@ -177,10 +177,18 @@ impl Provenance {
 
     /// The metadata of a population file, without what its header tells anyway.
     pub(super) fn population_metadata(&self, ending: &Ending) -> Map<String, Value> {
-        let mut told = self.describe(Some(ending));
-        told.retain(|key, _| !HEADER_KEYS.contains(&key.as_str()));
-        told
+        without_header_keys(self.describe(Some(ending)))
     }
+
+    /// The metadata of a population that the evolution passes through, without where in its course that was.
+    pub(super) fn snapshot_metadata(&self) -> Map<String, Value> {
+        without_header_keys(self.describe(None))
+    }
+}
+
+fn without_header_keys(mut told: Map<String, Value>) -> Map<String, Value> {
+    told.retain(|key, _| !HEADER_KEYS.contains(&key.as_str()));
+    told
 }
 
 /// What a file tells about the result in it.
@@ -261,7 +269,8 @@ fn hash_masks(masks: &MaskSet, hash: &mut Sha256) {
     }
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
+/// Two lower-case digits for each byte.
+pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

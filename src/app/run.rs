@@ -12,15 +12,16 @@ use super::job::Job;
 use super::options::{EvolveOptions, Mode, Verbosity};
 use super::progress::Progress;
 use super::provenance::{Ending, Provenances};
+use super::recorder::Recorder;
 use super::report::{self, Row, Status};
 use super::result::Evolved;
-use super::watch::Watch;
+use super::watch::{Watch, Watchers};
 use super::{curve_file, destination, memory, result, scheme};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, Spread};
 use crate::metrics::Difference;
-use crate::model::{Canvas, Population};
+use crate::model::Canvas;
 use crate::vk::ValidationLog;
 
 /// Evolves one picture and reports about it; the exit code of the process.
@@ -66,13 +67,25 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
         row.status = Status::Planned;
         let paths = options.destinations().map(|destination| &destination.path);
         let paths = paths.chain(options.curves.iter().map(|file| &file.path));
+        let paths = paths.chain(options.save_run.iter().map(|save_run| &save_run.folder));
         row.output = paths.map(|path| path.display().to_string()).collect();
         report::print_plan(row, options, &job, memory_bytes);
         return Ok(());
     }
 
     let mut curve = (!options.curves.is_empty()).then(|| Curve::new(0));
-    let evolved = evolve_job(options, &job, selected, (&interrupt, &mut curve), row)?;
+    let recorder = options.save_run.as_ref().map(|save_run| {
+        let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
+        Recorder::begin(
+            save_run,
+            births_planned,
+            job.population(Vec::new()),
+            provenances.population.snapshot_metadata(),
+        )
+    });
+    let mut watchers = Watchers { interrupt: &interrupt, recorder: recorder.transpose()? };
+    let evolved = evolve_job(options, &job, selected, (&mut watchers, &mut curve), row)?;
+    let recorder = watchers.recorder;
     let began = Instant::now();
     let status = evolved.ending.status;
     let outputs = outputs_to_write(options, &provenances, &evolved.ending);
@@ -84,6 +97,8 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
         curve_file::write(&options.curves, told, &mut interrupt, &mut row.output)
     });
     written.and(curve_written)?;
+    // A broken record of the course is no reason to lose its result.
+    row.output.extend(recorder.map(Recorder::outcome).transpose()?);
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {
@@ -124,7 +139,8 @@ fn check_replaceable(options: &EvolveOptions, provenances: &Provenances) -> Resu
         .chain(targets)
         .try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))?;
     let key = provenances.population.key();
-    options.curves.iter().try_for_each(|file| file.check_replaceable(key, options.overwrite))
+    options.curves.iter().try_for_each(|file| file.check_replaceable(key, options.overwrite))?;
+    options.save_run.iter().try_for_each(|save_run| save_run.check(key, options.overwrite))
 }
 
 /// The outputs without those that hold a better result of the same command.
@@ -159,31 +175,25 @@ fn evolve_job(
     options: &EvolveOptions,
     job: &Job,
     selected: Selected,
-    (interrupt, curve): (&Interrupt, &mut Option<Curve>),
+    (watchers, curve): (&mut Watchers<'_>, &mut Option<Curve>),
     row: &mut Row,
 ) -> Result<Evolved> {
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let evolution = Evolution::new(job.scheme.clone(), 0, width_px, height_px, job.first_flies());
     let mut engine = Engine::new(evaluator, vec![evolution]);
-    let mut watch = Watch::begin(interrupt, options.time_limit, Progress::new(options.progress));
+    let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress));
     let ran = engine.run(&mut (&mut watch, &mut *curve));
     if let Some(curve) = curve {
         curve.finish(engine.evolutions());
     }
-    row.evolve_ms = report::milliseconds(watch.finish());
+    row.evolve_ms = report::milliseconds(watch.finish(&engine.evolutions()[0]));
     ran?;
     let evolution = &engine.evolutions()[0];
     row.note_evolution(evolution);
     row.spread = Spread::of(evolution.best_flies(), width_px, height_px).clark_evans;
     let ending = Ending::of(evolution);
-    let population = Population {
-        width_px,
-        height_px,
-        background: job.background,
-        masks: job.masks(),
-        flies: evolution.best_flies().to_vec(),
-    };
+    let population = job.population(evolution.best_flies().to_vec());
     let evolved = result::draw(engine.evaluator(), options, population, ending)?;
     row.psnr = Difference::between(&evolved.mosaic.pixels, job.target.pixels()).psnr_db();
     drop(engine);

@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 
 use crate::model::{Blend, Population};
 
-pub use encode::encode;
+pub use encode::{encode, encode_snapshot};
 pub use read::{read, read_meta};
 
 /// Version of the file's layout.

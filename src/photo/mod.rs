@@ -4,6 +4,7 @@
 //! since the pixels decide all that evolves from them; a test holds hashes of decoded pictures. Knows no fly and no
 //! target.
 
+mod animation;
 mod color;
 mod decode;
 mod encode;
@@ -14,6 +15,7 @@ mod palette;
 mod resize;
 mod stencil;
 
+pub use animation::{ApngEncoder, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
 pub(crate) use decode::why_unreadable;
 pub use decode::{Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
 pub use encode::{Format, encode, encode_jpeg, encode_png};

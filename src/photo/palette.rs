@@ -72,7 +72,8 @@ pub fn reduce(photo: &mut Photo, palette: &[[u8; 3]]) {
     }
 }
 
-fn nearest(color: [u8; 3], palette: &[[u8; 3]]) -> [u8; 3] {
+/// The nearest colour of `palette`, as [`reduce`] takes it.
+pub(super) fn nearest(color: [u8; 3], palette: &[[u8; 3]]) -> [u8; 3] {
     let distance =
         |other: &[u8; 3]| -> u32 { color.iter().zip(other).map(|(&a, &b)| u32::from(a.abs_diff(b)).pow(2)).sum() };
     palette.iter().copied().min_by_key(distance).unwrap_or(color)
