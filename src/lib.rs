@@ -14,10 +14,12 @@ pub mod evolve;
 pub mod gpu;
 pub mod metrics;
 pub mod model;
+pub mod openraster;
 pub mod output;
 pub mod photo;
 pub mod plot;
 pub mod shapes;
+pub mod vector;
 pub mod vk;
 
 pub use error::{Error, Result};
