@@ -13,6 +13,8 @@ mod exactness;
 mod files;
 mod layering;
 mod layout;
+mod looks;
+mod paper;
 mod reference;
 mod scenarios;
 mod schemes;
