@@ -111,6 +111,23 @@ fn pictures_evolved_side_by_side_are_those_evolved_alone() {
 }
 
 #[test]
+fn lanes_with_schemes_of_their_own_evolve_as_each_would_alone() {
+    let chosen: Vec<PaperScheme> =
+        schemes().into_iter().filter(|(name, _)| ["median", "masks", "mitosis"].contains(name)).map(|s| s.1).collect();
+    let alone: Vec<Result> = chosen.iter().map(on_cpu).collect();
+    let scenes = vec![scene(); chosen.len()];
+    let evolution = |(lane, scheme): (usize, &PaperScheme)| {
+        Evolution::new(scheme.clone(), lane, 96, 80, first_population(scheme, &scenes[lane].target, 240))
+    };
+    let evolutions = chosen.iter().enumerate().map(evolution).collect();
+    let mut engine = Engine::new(Box::new(CpuEvaluator::new(scenes.clone())), evolutions);
+    engine.run(&mut Undisturbed).expect("the evaluator works");
+    for (evolution, (flies, sae, _)) in engine.evolutions().iter().zip(alone) {
+        assert_eq!((evolution.best_flies(), evolution.best_sae()), (&flies[..], Some(sae)));
+    }
+}
+
+#[test]
 fn all_colours_of_a_result_lie_in_the_palette() {
     for mode in [ColorMode::Evolved, ColorMode::Pick, ColorMode::Mean, ColorMode::Median] {
         let scheme = PaperScheme { color: color(mode, Some(palette())), mitosis: 1, crossover_q16: 20_000, ..usual() };
