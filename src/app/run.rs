@@ -68,16 +68,8 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
         return Ok(());
     }
 
-    let recorder = options.save_run.as_ref().map(|save_run| {
-        let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
-        Recorder::begin(
-            save_run,
-            births_planned,
-            job.population(Vec::new()),
-            provenances.population.snapshot_metadata(),
-        )
-    });
-    let mut watchers = Watchers { interrupt: &interrupt, recorder: recorder.transpose()? };
+    let recorder = begin_record(options, &job, &provenances)?;
+    let mut watchers = Watchers { interrupt: &interrupt, recorder };
     let evolved = evolve_job(options, &job, selected, &mut watchers, row)?;
     let recorder = watchers.recorder;
     let began = Instant::now();
@@ -94,6 +86,14 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
         report::print_summary(row, options, &job);
     }
     Ok(())
+}
+
+/// Begins to keep snapshots, if they were asked for.
+fn begin_record(options: &EvolveOptions, job: &Job, provenances: &Provenances) -> Result<Option<Recorder>> {
+    let Some(save_run) = &options.save_run else { return Ok(None) };
+    let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
+    let told = provenances.population.snapshot_metadata();
+    Recorder::begin(save_run, births_planned, job.population(Vec::new()), told).map(Some)
 }
 
 /// Gives the CPU twin as many threads as were asked for.
@@ -133,8 +133,8 @@ fn check_replaceable(options: &EvolveOptions, provenances: &Provenances) -> Resu
     outputs
         .chain(targets)
         .try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))?;
-    let save_run = options.save_run.iter();
-    save_run.map(|save_run| save_run.check(provenances.population.key(), options.overwrite)).collect()
+    let mut folder = options.save_run.iter();
+    folder.try_for_each(|save_run| save_run.check(provenances.population.key(), options.overwrite))
 }
 
 /// The outputs without those that hold a better result of the same command.
