@@ -117,7 +117,7 @@ pub(super) struct EvolveArgs {
     /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub save_run: Option<PathBuf>,
-    /// Births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 200th of all]
+    /// Births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 100th of all]
     #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
     pub save_every: Option<u64>,
     /// Replace outputs that are not smalti's or were made with other options

@@ -19,7 +19,7 @@ use crate::output;
 /// Snapshots that may wait to be written.
 const QUEUE_LENGTH: usize = 2;
 /// The first snapshots lie this share of their births apart: the picture changes fastest at the beginning.
-const EARLY_SHARE: u64 = 8;
+const EARLY_SHARE: u64 = 32;
 /// And at least this share of the births between later ones.
 const EARLY_LEAST_SHARE: u64 = 64;
 
@@ -125,7 +125,7 @@ impl Recorder {
 }
 
 /// Births from which the next snapshot is due after one at `births`: at every multiple of `every`, and closer together
-/// while an eighth of the births is less than that.
+/// while a 32nd of the births is less than that.
 fn next_due(births: u64, every: u64) -> u64 {
     let early = (births / EARLY_SHARE).clamp((every / EARLY_LEAST_SHARE).max(1), every);
     let multiple = (births / every).saturating_add(1).saturating_mul(every);
@@ -156,10 +156,10 @@ mod tests {
 
     #[test]
     fn snapshots_come_at_every_multiple_and_closer_together_at_the_beginning() {
-        let dues = dues(2_000, 400_000);
-        assert!((1..=200).all(|k| dues.contains(&(k * 2_000))));
-        assert!(dues.windows(2).all(|pair| pair[1] - pair[0] <= (pair[0] / 8).clamp(31, 2_000)));
-        assert!(dues.iter().filter(|&&due| due > 16_000).all(|due| due % 2_000 == 0));
+        let dues = dues(4_000, 400_000);
+        assert!((1..=100).all(|k| dues.contains(&(k * 4_000))));
+        assert!(dues.windows(2).all(|pair| pair[1] - pair[0] <= (pair[0] / 32).clamp(62, 4_000)));
+        assert!(dues.iter().filter(|&&due| due > 128_000).all(|due| due % 4_000 == 0));
         assert!((230..=260).contains(&dues.len()), "{}", dues.len());
     }
 

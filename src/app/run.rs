@@ -74,16 +74,8 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     }
 
     let mut curve = (!options.curves.is_empty()).then(|| Curve::new(0));
-    let recorder = options.save_run.as_ref().map(|save_run| {
-        let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
-        Recorder::begin(
-            save_run,
-            births_planned,
-            job.population(Vec::new()),
-            provenances.population.snapshot_metadata(),
-        )
-    });
-    let mut watchers = Watchers { interrupt: &interrupt, recorder: recorder.transpose()? };
+    let recorder = begin_record(options, &job, &provenances)?;
+    let mut watchers = Watchers { interrupt: &interrupt, recorder };
     let evolved = evolve_job(options, &job, selected, (&mut watchers, &mut curve), row)?;
     let recorder = watchers.recorder;
     let began = Instant::now();
@@ -105,6 +97,14 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
         report::print_summary(row, options, &job);
     }
     Ok(())
+}
+
+/// Begins to keep snapshots, if they were asked for.
+fn begin_record(options: &EvolveOptions, job: &Job, provenances: &Provenances) -> Result<Option<Recorder>> {
+    let Some(save_run) = &options.save_run else { return Ok(None) };
+    let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
+    let told = provenances.population.snapshot_metadata();
+    Recorder::begin(save_run, births_planned, job.population(Vec::new()), told).map(Some)
 }
 
 /// Gives the CPU twin as many threads as were asked for.

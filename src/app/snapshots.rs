@@ -16,8 +16,9 @@ use crate::error::{Error, Result};
 
 /// Least digits of the births in a name: names sort like their births up to a trillion.
 const NAME_DIGITS: usize = 12;
-/// Snapshots of all planned births, unless asked otherwise; the closer ones of the beginning come on top.
-const SNAPSHOT_COUNT: u64 = 200;
+/// The planned births are kept in so many equal steps, unless asked otherwise. With the closer snapshots of the
+/// beginning, that makes about 240.
+const STEP_COUNT: u64 = 100;
 
 /// Where, and how often, the snapshots of an evolution are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -52,7 +53,7 @@ impl SaveRun {
 
     /// Births between two snapshots of an evolution of so many births.
     pub(super) fn births_between(&self, births_planned: u64) -> u64 {
-        self.every.unwrap_or_else(|| births_planned.div_ceil(SNAPSHOT_COUNT)).max(1)
+        self.every.unwrap_or_else(|| births_planned.div_ceil(STEP_COUNT)).max(1)
     }
 
     /// Checks that the folder is empty, missing, or one of the evolution with this key.
@@ -76,7 +77,7 @@ impl SaveRun {
     }
 
     /// Makes the folder ready for the evolution with this key: creates it, and removes snapshots of others, which
-    /// [`SaveRun::check`] has allowed.
+    /// [`SaveRun::check`] has allowed. Files that are no snapshots of smalti stay, whatever their names.
     ///
     /// # Errors
     /// [`Error::Output`].
@@ -84,7 +85,7 @@ impl SaveRun {
         let prepare = || {
             fs::create_dir_all(&self.folder)?;
             let others = contents(&self.folder)?.snapshots.into_iter();
-            others.filter(|path| key_of(path).as_deref() != Some(key)).try_for_each(fs::remove_file)
+            others.filter(|path| key_of(path).is_some_and(|found| found != key)).try_for_each(fs::remove_file)
         };
         prepare().map_err(|error| self.unusable(&error))
     }
@@ -188,9 +189,9 @@ mod tests {
     }
 
     #[test]
-    fn the_default_covers_all_planned_births_with_two_hundred_snapshots() {
+    fn the_default_covers_all_planned_births_in_a_hundred_steps() {
         let every = |asked, planned| SaveRun::new(Path::new("run"), asked).map(|run| run.births_between(planned)).ok();
-        assert_eq!([every(None, 40_000), every(None, 40_001)], [Some(200), Some(201)]);
+        assert_eq!([every(None, 40_000), every(None, 40_001)], [Some(400), Some(401)]);
         assert_eq!([every(None, 0), every(Some(7), 40_000), every(Some(0), 40_000)], [Some(1), Some(7), None]);
     }
 }

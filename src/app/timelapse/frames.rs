@@ -19,6 +19,8 @@ pub(in crate::app) enum Spacing {
 /// even course in `frame_count` frames. No snapshot is shown twice, so there may be fewer frames.
 ///
 /// The error falls by a factor rather than by a difference: the eye sees the last 1 % of it go as it sees the first.
+/// Unless asked for more, that makes half as many frames as there are snapshots, since they are too far apart for more
+/// where the error falls fastest.
 pub(super) fn choose(snapshots: &[Snapshot], spacing: Spacing, frame_count: Option<usize>) -> Vec<usize> {
     let place = |(index, snapshot): (usize, &Snapshot)| match spacing {
         Spacing::Snapshots => index as f64,
@@ -28,7 +30,11 @@ pub(super) fn choose(snapshots: &[Snapshot], spacing: Spacing, frame_count: Opti
     };
     let places: Vec<f64> = snapshots.iter().enumerate().map(place).collect();
     let (Some(&begin), Some(&end)) = (places.first(), places.last()) else { return Vec::new() };
-    let steps = frame_count.unwrap_or(snapshots.len()).max(1) - 1;
+    let usual = match spacing {
+        Spacing::Error => snapshots.len().div_ceil(2),
+        Spacing::Births | Spacing::Snapshots => snapshots.len(),
+    };
+    let steps = frame_count.unwrap_or(usual).max(1) - 1;
     let mut chosen: Vec<usize> = Vec::new();
     for step in 0..steps {
         let wanted = begin + (end - begin) * step as f64 / steps as f64;
@@ -89,8 +95,8 @@ mod tests {
 
     #[test]
     fn a_picture_that_does_not_change_is_shown_once() {
-        assert_eq!(choose(&course(&[9, 9, 5, 5, 5, 3, 3]), Spacing::Error, None), [0, 2, 6]);
-        assert_eq!(choose(&course(&[9, 9, 9]), Spacing::Error, None), [0, 2]);
+        assert_eq!(choose(&course(&[9, 9, 5, 5, 5, 3, 3]), Spacing::Error, Some(7)), [0, 2, 6]);
+        assert_eq!(choose(&course(&[9, 9, 9]), Spacing::Error, Some(3)), [0, 2]);
         assert_eq!(choose(&course(&[9]), Spacing::Error, Some(7)), [0]);
     }
 }

@@ -51,7 +51,7 @@ pub(in crate::app) struct TimelapseArgs {
     /// Frames a second, 1 to 120; at most 50 in a GIF
     #[arg(long, value_name = "N", value_parser = values::count, default_value = "20", help_heading = "Time")]
     pub fps: u64,
-    /// Show at most so many of the snapshots, at least 1 [default: all that fit the spacing]
+    /// Show at most so many of the snapshots, at least 1 [default: half of them with --spacing error, else all]
     #[arg(long, value_name = "N", value_parser = values::count, help_heading = "Time")]
     pub frames: Option<u64>,
     /// What is even from frame to frame
@@ -109,7 +109,7 @@ pub(super) struct TimelapseOptions {
     pub background: Option<Rgb>,
     pub overwrite: Overwrite,
     pub frames_per_s: u16,
-    /// Most frames; `None` is one for each snapshot.
+    /// Most frames; `None` leaves it to the spacing.
     pub frame_count: Option<usize>,
     pub spacing: Spacing,
     hold_cs: u16,
