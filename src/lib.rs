@@ -13,8 +13,10 @@ pub mod error;
 pub mod evolve;
 pub mod gpu;
 pub mod model;
+pub mod openraster;
 pub mod output;
 pub mod photo;
+pub mod vector;
 pub mod vk;
 
 pub use error::{Error, Result};

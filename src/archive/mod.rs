@@ -3,10 +3,11 @@
 //! One array per gene (`x y z r g b w h angle`, f32), `fitness` (i64), `mask` (u16), `alive` (bool), the mask layers as
 //! `mask_0`, `mask_1`, ... (u8, 256x256x2: coverage and shade), and `meta.json`. `numpy.load` opens it with no code.
 //! Files have fixed dates, order and compression: the same population gives the same bytes, and save, load, save
-//! changes nothing.
+//! changes nothing. For programs that do not read `.npz` there are tables (`table.rs`), which are not read back.
 
 mod encode;
 mod read;
+mod table;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -15,6 +16,7 @@ use crate::model::{Blend, Population};
 
 pub use encode::encode;
 pub use read::{read, read_meta};
+pub use table::{encode_csv, encode_json, is_csv_table, read_json_meta};
 
 /// Version of the file's layout.
 const SCHEMA: u32 = 1;

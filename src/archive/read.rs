@@ -11,7 +11,7 @@ use zip::result::ZipError;
 
 use super::{Archive, GENE_COLUMNS, HEADER_MEMBER, Header, SCHEMA};
 use crate::error::{Error, Result};
-use crate::model::fly::Genes;
+use crate::model::fly::{Genes, SIDE_MAX, SIDE_MIN, UNITS_PER_PX};
 use crate::model::mask::{MASK_LAYERS_MAX, MASK_SIDE, Texel};
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
@@ -27,12 +27,12 @@ const ARRAY_HEADER_BYTES_MAX: usize = 4096;
 
 /// Reads the population at `path`, ours or one that numpy wrote.
 ///
-/// Columns of floats may be f32 or f64; `fitness` may be absent. Genes are moved to the nearest bound that they exceed,
-/// angles wrap.
+/// Columns of floats may be f32 or f64; `fitness` may be absent. Values are rounded to the nearest gene; angles wrap.
 ///
 /// # Errors
 /// [`Error::Input`] with the name of the column if the file cannot be read, is no population, lacks a column, or holds
-/// one of another type or length, a value that is not finite, or a mask that does not exist.
+/// one of another type or length, a value that is not finite, one that is farther than rounding from what a gene can be, or a
+/// mask that does not exist.
 pub fn read(path: &Path) -> Result<Archive> {
     read_population(path).map_err(|reason| Error::input(path, reason))
 }
@@ -52,7 +52,9 @@ fn read_population(path: &Path) -> Result<Archive, String> {
     let mut members = Members::open(path)?;
     let header = members.header()?;
     let masks = members.masks()?.with_blend(header.blend.into());
-    let [x, y, z, r, g, b, w, h, angle] = members.genes()?;
+    let columns = members.genes()?;
+    check_ranges(&columns, &header)?;
+    let [x, y, z, r, g, b, w, h, angle] = columns;
     let fly_count = x.len();
     let mask = members.column::<u16>("mask", "u16")?;
     let alive = members.column::<bool>("alive", "bool")?;
@@ -78,6 +80,31 @@ fn read_population(path: &Path) -> Result<Archive, String> {
         .collect();
     let Header { width_px, height_px, background, meta, .. } = header;
     Ok(Archive { population: Population { width_px, height_px, background, masks, flies }, fitness, meta })
+}
+
+/// Least and largest value of each of [`GENE_COLUMNS`], and half the unit that it is rounded to; angles have no end.
+///
+/// A value that is out of range by at most half a unit is one that rounding made, and rounds to the bound.
+fn ranges(width_px: u32, height_px: u32) -> [Option<(f64, f64, f64)>; 9] {
+    let px = f64::from(UNITS_PER_PX);
+    let position = |side_px: u32| Some((0.0, f64::from(side_px - 1), 0.5 / px));
+    let channel = Some((0.0, 1.0, 0.5 / 65_535.0));
+    let side = Some((f64::from(SIDE_MIN) / px, f64::from(SIDE_MAX) / px, 0.5 / px));
+    let depth = Some((-1.0, 1.0, 0.5 / f64::from(1 << 23)));
+    [position(width_px), position(height_px), depth, channel, channel, channel, side, side, None]
+}
+
+/// Refuses genes that no fly of such a picture can have.
+fn check_ranges(columns: &[Vec<f32>; 9], header: &Header) -> Result<(), String> {
+    let ranges = ranges(header.width_px, header.height_px);
+    for ((name, column), range) in GENE_COLUMNS.into_iter().zip(columns).zip(ranges) {
+        let Some((least, most, slack)) = range else { continue };
+        let allowed = least - slack..=most + slack;
+        if let Some(fly) = column.iter().position(|&value| !allowed.contains(&f64::from(value))) {
+            return Err(format!("its column `{name}` has {:?} (fly {fly}); it must be {least} to {most}", column[fly]));
+        }
+    }
+    Ok(())
 }
 
 /// The members of a zip file; every failure is a sentence for the user.

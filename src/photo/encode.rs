@@ -2,9 +2,10 @@
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
+use image::codecs::webp::WebPEncoder;
 
 use super::metadata::{self, Metadata};
-use super::{Photo, jpeg_segments};
+use super::{Photo, jpeg_segments, webp};
 use crate::error::{Error, Result};
 
 /// Deflate level of PNG files, 1 to 9.
@@ -20,16 +21,19 @@ pub enum Format {
         /// From 1 (smallest) to 100 (best).
         quality: u8,
     },
+    /// Lossless; 8-bit RGB.
+    WebP,
 }
 
 /// The photo as a file of this format.
 ///
 /// # Errors
-/// As [`encode_png`] and [`encode_jpeg`].
+/// As [`encode_png`], [`encode_jpeg`] and [`encode_webp`].
 pub fn encode(format: Format, photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
     match format {
         Format::Png => encode_png(photo, metadata),
         Format::Jpeg { quality } => encode_jpeg(photo, quality, metadata),
+        Format::WebP => encode_webp(photo, metadata),
     }
 }
 
@@ -44,12 +48,7 @@ pub fn encode_png(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
 
 fn png_bytes(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, photo.width_px, photo.height_px);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-    encoder.set_deflate_compression(png::DeflateCompression::Level(PNG_LEVEL));
-    encoder.set_filter(png::Filter::Adaptive);
+    let mut encoder = png_encoder(&mut bytes, (photo.width_px, photo.height_px), png::ColorType::Rgb);
     // The two kinds of chunk are written one after the other: with one kind the order stays.
     let ascii = metadata.iter().all(|(_, text)| text.is_ascii());
     for (keyword, text) in metadata.iter().cloned() {
@@ -63,6 +62,38 @@ fn png_bytes(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>, png::Encodin
     writer.write_image_data(photo.pixels.as_flattened())?;
     writer.finish()?;
     Ok(bytes)
+}
+
+/// Pixels with alpha, not premultiplied, as an 8-bit RGBA PNG with an sRGB chunk.
+///
+/// # Errors
+/// [`Error::Usage`] if there are not `width_px * height_px` pixels, or none.
+pub fn encode_png_with_alpha(width_px: u32, height_px: u32, pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
+    let write = || {
+        let mut bytes = Vec::new();
+        let mut writer = png_encoder(&mut bytes, (width_px, height_px), png::ColorType::Rgba).write_header()?;
+        writer.write_image_data(pixels.as_flattened())?;
+        writer.finish()?;
+        Ok(bytes)
+    };
+    write().map_err(|error: png::EncodingError| {
+        Error::Usage(format!("the picture cannot be written as PNG with alpha: {error}"))
+    })
+}
+
+/// An encoder with the settings of every PNG that is written.
+fn png_encoder(
+    bytes: &mut Vec<u8>,
+    (width_px, height_px): (u32, u32),
+    color: png::ColorType,
+) -> png::Encoder<'_, &mut Vec<u8>> {
+    let mut encoder = png::Encoder::new(bytes, width_px, height_px);
+    encoder.set_color(color);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.set_deflate_compression(png::DeflateCompression::Level(PNG_LEVEL));
+    encoder.set_filter(png::Filter::Adaptive);
+    encoder
 }
 
 /// The photo as a JPEG of `quality` 1 to 100, without colour subsampling, with the metadata as comments.
@@ -87,4 +118,25 @@ pub fn encode_jpeg(photo: &Photo, quality: u8, metadata: &Metadata) -> Result<Ve
     let header_end = jpeg_segments::header_end(&bytes);
     bytes.splice(header_end..header_end, comments);
     Ok(bytes)
+}
+
+/// The photo as a lossless WebP with the metadata as an XMP packet.
+///
+/// # Errors
+/// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]), or a side of the photo is 0 or above
+/// [`webp::WEBP_SIDE_MAX_PX`].
+pub fn encode_webp(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
+    metadata::check(metadata)?;
+    let Photo { width_px, height_px, pixels } = photo;
+    if pixels.is_empty() || *width_px.max(height_px) > webp::WEBP_SIDE_MAX_PX {
+        return Err(Error::Usage(format!(
+            "the picture cannot be written as WebP: its sides must be 1 to {} px, not {width_px}x{height_px}",
+            webp::WEBP_SIDE_MAX_PX
+        )));
+    }
+    let mut bytes = Vec::new();
+    WebPEncoder::new_lossless(&mut bytes)
+        .encode(pixels.as_flattened(), *width_px, *height_px, ExtendedColorType::Rgb8)
+        .map_err(|error| Error::Usage(format!("the picture cannot be written as WebP: {error}")))?;
+    if metadata.is_empty() { Ok(bytes) } else { Ok(webp::with_metadata(&bytes, (*width_px, *height_px), metadata)) }
 }

@@ -1,6 +1,6 @@
 //! Metadata of the pictures that we write: keywords and texts that tell how a picture came to be.
 //!
-//! A PNG carries each entry as a text chunk, a JPEG as a comment `keyword=text`. Reading needs no pixels, so a file's
+//! A PNG carries each entry as a text chunk, a JPEG as a comment `keyword=text`, a WebP in an XMP packet. Reading needs no pixels, so a file's
 //! key is known without decoding it.
 
 use std::fs::File;
@@ -8,7 +8,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 
 use super::decode::why_unreadable;
-use super::jpeg_segments;
+use super::{jpeg_segments, webp};
 use crate::error::{Error, Result};
 
 /// Keywords with their texts, in the order in which they are written.
@@ -38,12 +38,16 @@ pub(super) fn check(metadata: &Metadata) -> Result<()> {
     Ok(())
 }
 
-/// The metadata of the PNG or JPEG file at `path`; empty for anything else, since then nothing of ours is in it.
+/// The metadata of the PNG, JPEG or WebP file at `path`; empty for anything else, since then nothing of ours is in it.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read.
 pub fn read_metadata(path: &Path) -> Result<Metadata> {
     let header = read_header(path)?;
+    if webp::is_webp(&header) {
+        let found = File::open(path).and_then(|file| webp::metadata(BufReader::new(file)));
+        return found.map_err(|error| Error::input(path, why_unreadable(&error)));
+    }
     if header.starts_with(&PNG_SIGNATURE) { Ok(png_metadata(&header)) } else { Ok(jpeg_metadata(&header)) }
 }
 
@@ -71,7 +75,8 @@ fn read_header(path: &Path) -> Result<Vec<u8>> {
     Ok(header)
 }
 
-fn png_metadata(header: &[u8]) -> Metadata {
+/// The text chunks ahead of the pixels of a PNG file that begins with `header`; empty if that is no PNG.
+pub(crate) fn png_metadata(header: &[u8]) -> Metadata {
     let limits = png::Limits { bytes: HEADER_BYTES as usize };
     let Ok(reader) = png::Decoder::new_with_limits(std::io::Cursor::new(header), limits).read_info() else {
         return Metadata::new();

@@ -11,11 +11,15 @@ mod icc;
 mod jpeg_segments;
 mod metadata;
 mod resize;
+mod webp;
+pub(crate) mod xml;
 
 pub(crate) use decode::why_unreadable;
 pub use decode::{Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
-pub use encode::{Format, encode, encode_jpeg, encode_png};
+pub use encode::{Format, encode, encode_jpeg, encode_png, encode_png_with_alpha, encode_webp};
+pub(crate) use metadata::png_metadata;
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
+pub use webp::WEBP_SIDE_MAX_PX;
 
 /// A picture in memory: 8-bit sRGB, no alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]

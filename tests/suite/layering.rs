@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LEVELS: [&[&str]; 7] = [
     &["error"],
     &["photo", "output", "model"],
-    &["archive", "evolve", "cpu", "vk"],
+    &["archive", "evolve", "cpu", "vk", "vector", "openraster"],
     &["gpu"],
     &["engine"],
     &["app"],

@@ -16,7 +16,7 @@ use super::{noise, short_hash};
 
 const SIDE_PX: u32 = 300;
 
-fn population() -> Population {
+pub fn population() -> Population {
     let flies = noise(500 * 16).as_chunks::<16>().0.iter().map(fly_of).collect();
     let texels = noise(256 * 256 * 2);
     let texels = texels.as_chunks::<2>().0.iter().map(|&[coverage, shade]| Texel { coverage, shade });
@@ -48,7 +48,7 @@ fn fly_of(bytes: &[u8; 16]) -> Fly {
     fly.clamped(SIDE_PX, SIDE_PX)
 }
 
-fn fitness() -> Vec<i64> {
+pub fn fitness() -> Vec<i64> {
     (0..500).map(|i| (i - 250) * 1_000_000_007_i64).collect()
 }
 
@@ -114,10 +114,10 @@ fn what_cannot_be_read_back_is_not_written() {
 }
 
 /// The members of a `.npz` file, to be changed and zipped again.
-struct Members(Vec<(String, Vec<u8>)>);
+pub struct Members(Vec<(String, Vec<u8>)>);
 
 impl Members {
-    fn of(bytes: &[u8]) -> Self {
+    pub fn of(bytes: &[u8]) -> Self {
         let mut zip = ZipArchive::new(Cursor::new(bytes)).expect("it is a zip file");
         let names: Vec<String> =
             (0..zip.len()).map(|i| zip.name_for_index(i).expect("it is there").expect("ASCII").into_owned()).collect();
@@ -133,18 +133,18 @@ impl Members {
         )
     }
 
-    fn without(mut self, name: &str) -> Self {
+    pub fn without(mut self, name: &str) -> Self {
         self.0.retain(|(member, _)| member != name);
         self
     }
 
-    fn with(self, name: &str, content: Vec<u8>) -> Self {
+    pub fn with(self, name: &str, content: Vec<u8>) -> Self {
         let mut others = self.without(name);
         others.0.push((name.to_owned(), content));
         others
     }
 
-    fn zipped(self) -> Vec<u8> {
+    pub fn zipped(self) -> Vec<u8> {
         let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
         for (name, content) in self.0 {
             zip.start_file(name, SimpleFileOptions::default()).expect("a new member");
@@ -155,7 +155,7 @@ impl Members {
 }
 
 /// An array as numpy writes it.
-fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
+pub fn npy(descr: &str, shape: &str, values: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}");
     let header = format!("{header:<117}\n");
     [b"\x93NUMPY\x01\0", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), values].concat()
@@ -181,16 +181,51 @@ fn without_fitness_every_fly_has_none() {
     assert_eq!(archive.fitness, vec![0; 500]);
 }
 
+/// The file with fly 7 changed in one column of floats.
+fn with_value(column: &str, value: f32) -> Vec<u8> {
+    let genes = population().flies.iter().map(Fly::genes).collect::<Vec<_>>();
+    let of = |index: usize| match column {
+        "x" => genes[index].x,
+        "y" => genes[index].y,
+        "z" => genes[index].z,
+        "r" => genes[index].r,
+        "g" => genes[index].g,
+        "b" => genes[index].b,
+        "w" => genes[index].w,
+        "h" => genes[index].h,
+        _ => genes[index].angle_deg,
+    };
+    let values = (0..500).flat_map(|index| if index == 7 { value } else { of(index) }.to_le_bytes());
+    Members::of(&ours()).with(&format!("{column}.npy"), npy("<f4", "(500,)", &values.collect::<Vec<_>>())).zipped()
+}
+
 #[test]
-fn genes_beyond_their_bounds_are_moved_to_them() {
-    let far: Vec<u8> = (0..500).flat_map(|i| if i % 2 == 0 { 1e30_f32 } else { -1e30 }.to_le_bytes()).collect();
-    let members =
-        Members::of(&ours()).with("x.npy", npy("<f4", "(500,)", &far)).with("w.npy", npy("<f4", "(500,)", &far));
-    let flies = read_bytes(&members.zipped()).expect("it is a population").population.flies;
-    for (index, fly) in flies.iter().enumerate() {
-        assert_eq!(*fly, fly.clamped(SIDE_PX, SIDE_PX));
-        assert_eq!(fly.x, if index % 2 == 0 { (SIDE_PX as i32 - 1) * 64 } else { 0 });
+fn genes_that_no_fly_can_have_are_refused_with_column_and_fly() {
+    for (column, value, message) in [
+        ("x", 299.02, "its column `x` has 299.02 (fly 7); it must be 0 to 299"),
+        ("x", -1e30, "its column `x` has -1e30 (fly 7); it must be 0 to 299"),
+        ("y", -0.01, "its column `y` has -0.01 (fly 7); it must be 0 to 299"),
+        ("z", 1.0001, "its column `z` has 1.0001 (fly 7); it must be -1 to 1"),
+        ("r", 255.0, "its column `r` has 255.0 (fly 7); it must be 0 to 1"),
+        ("g", -0.0001, "its column `g` has -0.0001 (fly 7); it must be 0 to 1"),
+        ("b", 1.0001, "its column `b` has 1.0001 (fly 7); it must be 0 to 1"),
+        ("w", 0.0, "its column `w` has 0.0 (fly 7); it must be 0.25 to 4096"),
+        ("h", 4096.1, "its column `h` has 4096.1 (fly 7); it must be 0.25 to 4096"),
+    ] {
+        assert_eq!(refusal(&with_value(column, value)), message);
     }
+}
+
+#[test]
+fn what_rounding_puts_beyond_a_bound_is_moved_to_it_and_angles_wrap() {
+    let changed =
+        |column, value| read_bytes(&with_value(column, value)).expect("it is a population").population.flies[7];
+    assert_eq!([changed("x", 299.007).x, changed("x", -0.007).x], [299 * 64, 0]);
+    assert_eq!(changed("x", 299.0 + 0.5 / 64.0).x, 299 * 64);
+    assert_eq!([changed("z", 1.0).z, changed("z", -1.0).z], [(1 << 24) - 1, 0]);
+    assert_eq!([changed("b", 1.000_005).b, changed("b", -0.000_005).b], [65_535, 0]);
+    assert_eq!([changed("w", 0.245).w, changed("w", 4096.0).w], [16, 4096 * 64]);
+    assert_eq!([changed("angle", -90.0).angle, changed("angle", 720.0 + 45.0).angle], [3 << 14, 1 << 13]);
 }
 
 #[test]

@@ -61,7 +61,7 @@ fn a_png_says_that_it_is_srgb() {
 }
 
 #[test]
-fn metadata_comes_back_in_order_from_both_formats() {
+fn metadata_comes_back_in_order_from_every_format() {
     let photo = load("rgb.png");
     for entries in [
         metadata(&[]),
@@ -75,6 +75,8 @@ fn metadata_comes_back_in_order_from_both_formats() {
         let jpeg = encode(JPEG, &photo, &entries).expect("it can be encoded");
         assert_eq!(with_file(&jpeg, read_metadata).expect("it can be read"), entries);
         assert_eq!(with_file(&jpeg, read_jpeg_metadata).expect("it can be read"), entries);
+        let webp = encode(Format::WebP, &photo, &entries).expect("it can be encoded");
+        assert_eq!(with_file(&webp, read_metadata).expect("it can be read"), entries);
         assert!(with_file(&jpeg, read_png_metadata).expect("it can be read").is_empty());
     }
 }
@@ -83,7 +85,7 @@ fn metadata_comes_back_in_order_from_both_formats() {
 fn metadata_changes_no_pixel() {
     let photo = load("rgb.png");
     let long = metadata(&[("key", &"x".repeat(65_000))]);
-    for format in [Format::Png, JPEG] {
+    for format in [Format::Png, JPEG, Format::WebP] {
         let bare = encode(format, &photo, &vec![]).expect("it can be encoded");
         let tagged = encode(format, &photo, &long).expect("it can be encoded");
         assert_eq!(decoded(&bare), decoded(&tagged), "{format:?}");
@@ -97,7 +99,7 @@ fn metadata_that_would_not_come_back_is_refused() {
     for (keyword, text) in
         [("", "a"), ("a=b", "c"), (" a", "b"), ("é", "b"), (&long[..80], "b"), ("a", "b\0c"), ("a", &long)]
     {
-        for format in [Format::Png, JPEG] {
+        for format in [Format::Png, JPEG, Format::WebP] {
             assert!(encode(format, &photo, &metadata(&[(keyword, text)])).is_err(), "{format:?} {keyword:?}");
         }
     }
@@ -118,6 +120,30 @@ fn what_cannot_be_encoded_is_refused() {
     assert!(encode(Format::Png, &empty, &vec![]).is_err());
     assert!(encode(JPEG, &empty, &vec![]).is_err());
     assert!(encode(JPEG, &wide, &vec![]).is_err());
+    assert!(encode(Format::WebP, &empty, &vec![]).is_err());
+    assert!(encode(Format::WebP, &wide, &vec![]).is_err());
     assert!(encode(Format::Jpeg { quality: 0 }, &load("rgb.png"), &vec![]).is_err());
     assert!(encode(Format::Jpeg { quality: 101 }, &load("rgb.png"), &vec![]).is_err());
+}
+
+#[test]
+fn a_webp_loses_no_pixel_whatever_its_size() {
+    let whole = load("rgb.png");
+    assert_eq!(decoded(&encode(Format::WebP, &whole, &metadata(&[("a", "b")])).expect("it can be encoded")), whole);
+    for (width_px, height_px) in [(1, 1), (3, 2), (16_383, 1)] {
+        let pixels = super::noise((width_px * height_px * 3) as usize).as_chunks::<3>().0.to_vec();
+        let photo = Photo { width_px, height_px, pixels };
+        for entries in [vec![], metadata(&[("odd", "abc"), ("even", "ab")])] {
+            assert_eq!(decoded(&encode(Format::WebP, &photo, &entries).expect("it can be encoded")), photo);
+        }
+    }
+}
+
+#[test]
+fn pixels_with_alpha_come_back_as_they_were() {
+    let pixels = super::noise(5 * 7 * 4).as_chunks::<4>().0.to_vec();
+    let png = smalti::photo::encode_png_with_alpha(5, 7, &pixels).expect("it can be encoded");
+    let decoded = image::load_from_memory(&png).expect("it can be decoded").to_rgba8();
+    assert_eq!((decoded.dimensions(), decoded.as_raw().as_slice()), ((5, 7), pixels.as_flattened()));
+    assert!(smalti::photo::encode_png_with_alpha(5, 6, &pixels).is_err());
 }

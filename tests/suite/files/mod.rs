@@ -1,9 +1,12 @@
 //! Files in and out, through the public functions.
 
-mod archives;
+pub mod archives;
 mod encoding;
+mod openraster;
 mod outputs;
 mod photos;
+mod tables;
+mod vector;
 
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,213 @@
+//! Populations as OpenRaster files (`.ora`): the mosaic in depth bands, each a layer with alpha, over the background.
+//!
+//! A band is drawn by an [`Evaluator`] over black and over white; what differs is its transparency. Dates, order and
+//! compression are fixed: the same population gives the same bytes. The format: <https://www.openraster.org>.
+
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read, Write};
+use std::path::Path;
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+
+use crate::error::{Error, Result};
+use crate::model::blocks::{depth_order, index_of};
+use crate::model::{Canvas, Evaluator, Fly, Mosaic, Population, Rgb};
+use crate::photo::{self, Metadata, Photo};
+
+/// Depth bands of a file, if nobody asks for another number.
+pub const BAND_COUNT: usize = 8;
+
+/// The longer side in px of the thumbnail that the format asks for.
+const THUMBNAIL_SIDE_PX: u32 = 256;
+/// Samples along each side of a pixel of the thumbnail.
+const THUMBNAIL_SUPERSAMPLING: u32 = 4;
+/// Member that holds the whole picture, and our metadata as its own.
+const MERGED_MEMBER: &str = "mergedimage.png";
+/// Bytes of the whole picture in which its metadata is looked for.
+const METADATA_BYTES: u64 = 1 << 20;
+
+/// The parts of a file that need drawing, apart from the whole picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layers {
+    width_px: u32,
+    height_px: u32,
+    /// Names and PNG files of the layers, the background first.
+    layers: Vec<(String, Vec<u8>)>,
+    thumbnail: Vec<u8>,
+}
+
+impl Layers {
+    /// Draws `population` on `canvas` in `band_count` bands of equally many living flies, or one more; fewer bands if
+    /// there are fewer flies.
+    ///
+    /// Composed in order they are the whole picture: exactly, for opaque masks and one sample a pixel; else but for
+    /// rounding and for pixels that several bands share.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn draw(
+        evaluator: &mut dyn Evaluator,
+        population: &Population,
+        canvas: &Canvas,
+        supersampling: u32,
+        band_count: usize,
+    ) -> Result<Self> {
+        let Canvas { width_px, height_px, .. } = *canvas;
+        let pixel_count = width_px as usize * height_px as usize;
+        let [r, g, b] = population.background;
+        let background = photo::encode_png_with_alpha(width_px, height_px, &vec![[r, g, b, 255]; pixel_count])?;
+        let mut layers = vec![("Background".to_owned(), background)];
+        let bands = bands(&population.flies, band_count);
+        for (number, flies) in (1..).zip(&bands) {
+            let mut over = |background: Rgb| {
+                let (masks, flies) = (population.masks.clone(), flies.clone());
+                let band = Population { background, masks, flies, ..*population };
+                evaluator.draw(&band, canvas, supersampling)
+            };
+            let (black, white) = (over([0; 3])?, over([255; 3])?);
+            let png = photo::encode_png_with_alpha(width_px, height_px, &cut_out(&black, &white))?;
+            layers.push((band_name(number, bands.len()), png));
+        }
+        let longest = population.width_px.max(population.height_px);
+        let thumbnail =
+            Canvas::scaled(population.width_px, population.height_px, THUMBNAIL_SIDE_PX.min(width_px.max(height_px)));
+        let supersampling =
+            if thumbnail.width_px.max(thumbnail.height_px) == longest { 1 } else { THUMBNAIL_SUPERSAMPLING };
+        let Mosaic { width_px: w, height_px: h, pixels } = evaluator.draw(population, &thumbnail, supersampling)?;
+        let thumbnail = Photo { width_px: w, height_px: h, pixels };
+        Ok(Self { width_px, height_px, layers, thumbnail: photo::encode_png(&thumbnail, &Metadata::new())? })
+    }
+}
+
+/// The living flies cut into bands, the farthest first. Within a band the nearest comes first, so that flies of one
+/// depth keep their order.
+fn bands(flies: &[Fly], band_count: usize) -> Vec<Vec<Fly>> {
+    let order = depth_order(flies).into_iter().map(|key| flies[index_of(key) as usize]);
+    let living: Vec<Fly> = order.filter(|fly| fly.alive).collect();
+    let count = band_count.min(living.len());
+    let cut = |band: usize| living.len() * band / count;
+    (0..count).rev().map(|band| living[cut(band)..cut(band + 1)].to_vec()).collect()
+}
+
+fn band_name(number: usize, count: usize) -> String {
+    let place = match number {
+        1 => ", farthest",
+        _ if number == count => ", nearest",
+        _ => "",
+    };
+    format!("Tiles {number} of {count}{place}")
+}
+
+/// What covers black and white alike, with its opacity; not premultiplied.
+fn cut_out(over_black: &Mosaic, over_white: &Mosaic) -> Vec<[u8; 4]> {
+    let pixel = |(black, white): (&Rgb, &Rgb)| {
+        // Each channel was rounded by itself, so the three may differ by one.
+        let sum: u32 = black.iter().zip(white).map(|(&black, &white)| 255 - u32::from(white.abs_diff(black))).sum();
+        let alpha = (sum + 1) / 3;
+        let channel = |value: u8| (u32::from(value) * 255 + alpha / 2).checked_div(alpha).unwrap_or(0).min(255) as u8;
+        let [r, g, b] = black.map(channel);
+        [r, g, b, alpha as u8]
+    };
+    over_black.pixels.iter().zip(&over_white.pixels).map(pixel).collect()
+}
+
+/// The OpenRaster file of `layers` and of `merged`, the whole picture as a PNG file with our metadata in it.
+///
+/// # Errors
+/// [`Error::Usage`] if the zip file would be larger than its format allows.
+pub fn encode(layers: &Layers, merged: &[u8]) -> Result<Vec<u8>> {
+    write_members(layers, merged)
+        .map_err(|error| Error::Usage(format!("the picture cannot be written as OpenRaster: {error}")))
+}
+
+fn write_members(layers: &Layers, merged: &[u8]) -> zip::result::ZipResult<Vec<u8>> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    let options = SimpleFileOptions::default().last_modified_time(DateTime::default()).unix_permissions(0o644);
+    let (stored, deflated) = (
+        options.compression_method(CompressionMethod::Stored),
+        options.compression_method(CompressionMethod::Deflated),
+    );
+    let mut add = |name: &str, options: SimpleFileOptions, bytes: &[u8]| {
+        zip.start_file(name, options)?;
+        zip.write_all(bytes).map_err(zip::result::ZipError::from)
+    };
+    // First and stored, so that the kind of file shows in its first bytes.
+    add("mimetype", stored, b"image/openraster")?;
+    add("stack.xml", deflated.compression_level(Some(6)), stack(layers).as_bytes())?;
+    for (number, (_, png)) in layers.layers.iter().enumerate() {
+        add(&member_of_layer(number), stored, png)?;
+    }
+    add(MERGED_MEMBER, stored, merged)?;
+    add("Thumbnails/thumbnail.png", stored, &layers.thumbnail)?;
+    Ok(zip.finish()?.into_inner())
+}
+
+fn member_of_layer(number: usize) -> String {
+    format!("data/layer{number}.png")
+}
+
+/// The description of the layers, the topmost first.
+fn stack(layers: &Layers) -> String {
+    let layer = |(number, (name, _)): (usize, &(String, Vec<u8>))| {
+        let member = member_of_layer(number);
+        format!(
+            "    <layer name=\"{name}\" src=\"{member}\" x=\"0\" y=\"0\" opacity=\"1.0\" visibility=\"visible\" \
+             composite-op=\"svg:src-over\"/>\n"
+        )
+    };
+    let stacked: String = layers.layers.iter().enumerate().rev().map(layer).collect();
+    let Layers { width_px, height_px, .. } = layers;
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <image version=\"0.0.3\" w=\"{width_px}\" h=\"{height_px}\">\n  <stack>\n{stacked}  </stack>\n</image>\n"
+    )
+}
+
+/// The metadata of the OpenRaster file at `path`, which is that of its whole picture; empty for anything else.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be opened.
+pub fn read_metadata(path: &Path) -> Result<Metadata> {
+    let file = File::open(path).map_err(|error| Error::input(path, photo::why_unreadable(&error)))?;
+    let mut header = Vec::new();
+    if let Ok(mut zip) = ZipArchive::new(BufReader::new(file))
+        && let Ok(merged) = zip.by_name(MERGED_MEMBER)
+        && merged.take(METADATA_BYTES).read_to_end(&mut header).is_err()
+    {
+        header.clear();
+    }
+    Ok(photo::png_metadata(&header))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_hold_equally_many_living_flies_and_together_all_of_them() {
+        let fly = |index: u32| Fly { z: 97 * index % 101, x: index as i32, alive: index % 5 != 0, ..Fly::ABSENT };
+        let flies: Vec<Fly> = (0..101).map(fly).collect();
+        let bands = bands(&flies, 8);
+        assert_eq!(bands.iter().map(Vec::len).collect::<Vec<_>>(), [10; 8]);
+        let depths: Vec<u32> = bands.iter().rev().flatten().map(|fly| fly.z).collect();
+        assert!(depths.is_sorted() && depths.len() == 80);
+        assert_eq!(super::bands(&flies[..3], 8).len(), 2);
+        assert!(super::bands(&flies[..1], 8).is_empty());
+    }
+
+    #[test]
+    fn a_colour_of_any_opacity_is_found_again() {
+        for alpha in [0, 1, 128, 254, 255_u32] {
+            let over = |background: u32| {
+                let channel = |color: u32| ((color * alpha + background * (255 - alpha) + 127) / 255) as u8;
+                Mosaic { width_px: 1, height_px: 1, pixels: vec![[200, 0, 255].map(channel)] }
+            };
+            let found = cut_out(&over(0), &over(255));
+            let expected = if alpha == 0 { [0; 3] } else { [200, 0, 255] };
+            assert_eq!(u32::from(found[0][3]), alpha);
+            let off = found[0].iter().zip(expected).map(|(&a, b)| a.abs_diff(b)).max();
+            assert!(off <= Some((128 / alpha.max(1)) as u8), "{found:?} at {alpha}");
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Populations as SVG: one element per living fly, the farthest first, so that the document's order is the depth order.
+//!
+//! Geometry comes from the integer genes alone. A user unit is 1/128 px, half of a gene's unit, so that the corners of
+//! tiles before they are turned are whole numbers; the view box begins at -64, since the centre of pixel (0, 0) is the origin. Masks
+//! stand once in `<defs>` (`shapes.rs`). Plain SVG 1.1 without scripts, fonts or links, the same bytes every time.
+
+mod base64;
+mod outline;
+mod shapes;
+
+use std::fmt::Write;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use serde_json::{Map, Value};
+
+use crate::error::{Error, Result};
+use crate::model::blocks::{depth_order, index_of};
+use crate::model::tables::TURN_STEPS;
+use crate::model::{Canvas, Fly, Population, Rgb};
+use crate::photo::{self, xml};
+
+use shapes::Shapes;
+
+/// User units per pixel of the picture that evolved.
+const UNITS_PER_PX: f64 = 128.0;
+/// Element that holds the metadata.
+const RESULT: &str = "smalti:result";
+/// Bytes of a file in which its metadata is looked for; ours begins within the first three hundred.
+const HEADER_BYTES: u64 = 1 << 20;
+
+/// The population as an SVG document whose `width` and `height` are those of `canvas`; `told` is its metadata.
+///
+/// # Errors
+/// [`Error::Usage`] if the picture of a mask cannot be encoded.
+pub fn encode(population: &Population, canvas: &Canvas, told: &Map<String, Value>) -> Result<Vec<u8>> {
+    let order = depth_order(&population.flies);
+    let flies: Vec<&Fly> =
+        order.iter().rev().map(|&key| &population.flies[index_of(key) as usize]).filter(|fly| fly.alive).collect();
+    let shapes = Shapes::of(population, &flies)?;
+    let mut svg = head(canvas, flies.len(), told);
+    svg.push_str(shapes.definitions());
+    let (width, height) = extent(canvas);
+    let color = hexadecimal(population.background);
+    push(&mut svg, format_args!("<path d=\"M-64-64h{width}v{height}h-{width}z\" fill=\"{color}\"/>\n"));
+    for fly in flies {
+        push_fly(&mut svg, fly);
+    }
+    svg.push_str("</svg>\n");
+    Ok(svg.into_bytes())
+}
+
+/// Everything ahead of the drawing.
+fn head(canvas: &Canvas, fly_count: usize, told: &Map<String, Value>) -> String {
+    let (width, height) = extent(canvas);
+    let told = xml::escape(&Value::Object(told.clone()).to_string());
+    let Canvas { width_px, height_px, .. } = canvas;
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" \
+         width=\"{width_px}\" height=\"{height_px}\" viewBox=\"-64 -64 {width} {height}\">\n\
+         <title>Mosaic of {fly_count} tiles</title>\n\
+         <metadata xmlns:smalti=\"urn:smalti:\"><{RESULT}>{told}</{RESULT}></metadata>\n"
+    )
+}
+
+/// Width and height of the view box: the canvas in user units, so that a side that was rounded to whole pixels shows a
+/// little more or less, as the raster pictures do, and nothing is stretched.
+fn extent(canvas: &Canvas) -> (f64, f64) {
+    let (numerator, denominator) = canvas.scale;
+    let side = |px: u32| f64::from(px) * UNITS_PER_PX * f64::from(denominator) / f64::from(numerator);
+    (side(canvas.width_px), side(canvas.height_px))
+}
+
+/// The tile of one fly: a rectangle turned about its centre, or a mask that is stretched, turned and moved to its place.
+fn push_fly(svg: &mut String, fly: &Fly) {
+    let (x, y, w, h) = (2 * i64::from(fly.x), 2 * i64::from(fly.y), i64::from(fly.w), i64::from(fly.h));
+    // The engine knows 4,096 directions.
+    let direction = (usize::from(fly.angle) * TURN_STEPS) >> 16;
+    let degrees = four_decimals(direction as f64 * 360.0 / TURN_STEPS as f64);
+    let color = hexadecimal(fly.color());
+    if fly.mask > 0 {
+        let rotate = if direction == 0 { String::new() } else { format!("rotate({degrees})") };
+        // A side of w genes is 2w units, over the 256 units of a mask.
+        let [across, along] = [w, h].map(|side| side as f64 / 128.0);
+        let transform = format!("translate({x} {y}){rotate}scale({across} {along})");
+        let mask = fly.mask;
+        push(svg, format_args!("<use xlink:href=\"#m{mask}\" transform=\"{transform}\" fill=\"{color}\"/>\n"));
+        return;
+    }
+    let (left, top, width, height) = (x - w, y - h, 2 * w, 2 * h);
+    push(svg, format_args!("<path d=\"M{left} {top}h{width}v{height}h-{width}z\""));
+    if direction != 0 {
+        push(svg, format_args!(" transform=\"rotate({degrees} {x} {y})\""));
+    }
+    push(svg, format_args!(" fill=\"{color}\"/>\n"));
+}
+
+/// An angle in degrees, off by at most 0.00005: a corner of the largest tile moves by less than a gene's unit.
+fn four_decimals(degrees: f64) -> String {
+    let text = format!("{degrees:.4}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn hexadecimal([r, g, b]: Rgb) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// Appends to a text, which cannot fail.
+fn push(svg: &mut String, text: std::fmt::Arguments<'_>) {
+    svg.write_fmt(text).expect("a string takes everything");
+}
+
+/// What the writer of the SVG file at `path` told; `None` if it is not one of ours.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read.
+pub fn read_meta(path: &Path) -> Result<Option<Map<String, Value>>> {
+    let mut header = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(HEADER_BYTES).read_to_end(&mut header))
+        .map_err(|error| Error::input(path, photo::why_unreadable(&error)))?;
+    let header = String::from_utf8_lossy(&header);
+    let told = xml::contents(&header, RESULT).next().map(xml::unescape);
+    Ok(told.and_then(|told| serde_json::from_str(&told).ok()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_as_short_as_they_can_be() {
+        assert_eq!(
+            [0.087_890_625, 45.0, 359.912_109_375, 90.5, 100.0].map(four_decimals),
+            ["0.0879", "45", "359.9121", "90.5", "100"]
+        );
+    }
+
+    #[test]
+    fn the_view_box_of_a_rounded_canvas_keeps_the_scale() {
+        assert_eq!(extent(&Canvas::evaluation(600, 401)), (76_800.0, 51_328.0));
+        assert_eq!(extent(&Canvas::scaled(600, 401, 100)), (76_800.0, 402.0 * 128.0));
+    }
+}

@@ -1,0 +1,79 @@
+//! Tables of flies for other programs.
+
+use serde_json::{Map, Value, json};
+use smalti::archive::{encode_csv, encode_json, is_csv_table, read_json_meta};
+use smalti::model::fly::Genes;
+use smalti::model::{Blend, Fly, Population};
+
+use super::archives::{fitness, population};
+use crate::workshop::Workshop;
+
+const COLUMNS: [&str; 13] = ["x", "y", "z", "r", "g", "b", "w", "h", "angle", "mask", "alive", "fitness", "color"];
+
+/// The fly and its fitness in a row of values as they are spelt.
+fn fly_of(row: &[String]) -> (Fly, i64) {
+    let [x, y, z, r, g, b, w, h, angle_deg] = std::array::from_fn(|column| row[column].parse::<f32>().unwrap());
+    let genes = Genes { x, y, z, r, g, b, w, h, angle_deg };
+    let fly = Fly { alive: row[10].parse().unwrap(), ..Fly::from_genes(&genes, row[9].parse().unwrap()) };
+    let [red, green, blue] = fly.color();
+    assert_eq!(row[12], format!("#{red:02x}{green:02x}{blue:02x}"));
+    (fly, row[11].parse().unwrap())
+}
+
+fn assert_all_flies(rows: impl Iterator<Item = Vec<String>>) {
+    let (population, fitness) = (population(), fitness());
+    let expected: Vec<(Fly, i64)> = population.flies.into_iter().zip(fitness).collect();
+    let found: Vec<(Fly, i64)> = rows.map(|row| fly_of(&row)).collect();
+    assert!(found == expected);
+}
+
+#[test]
+fn a_csv_table_has_nothing_but_a_line_of_names_and_a_line_per_fly_and_loses_no_bit() {
+    let csv = encode_csv(&population(), &fitness()).unwrap();
+    assert_eq!(csv, encode_csv(&population(), &fitness()).unwrap());
+    let text = std::str::from_utf8(&csv).unwrap();
+    assert_eq!(text.lines().count(), 501);
+    assert!(text.starts_with(&COLUMNS.join(",")) && text.ends_with('\n') && !text.contains(['"', '\r']));
+    let mut reader = csv::Reader::from_reader(&csv[..]);
+    assert_all_flies(reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()));
+}
+
+#[test]
+fn an_empty_csv_table_still_has_its_names() {
+    let csv = encode_csv(&Population { flies: vec![], ..population() }, &[]).unwrap();
+    assert_eq!(String::from_utf8(csv).unwrap(), format!("{}\n", COLUMNS.join(",")));
+}
+
+#[test]
+fn a_json_table_is_one_object_and_loses_no_bit() {
+    let meta = json!({"key": "k", "note": "a \"b\"\n"}).as_object().unwrap().clone();
+    let population = Population { masks: population().masks.with_blend(Blend::Translucent), ..population() };
+    let bytes = encode_json(&population, &fitness(), &meta).unwrap();
+    let table: Value = serde_json::from_slice(&bytes).unwrap();
+    assert_eq!(table["meta"], Value::Object(meta));
+    let header = ["width_px", "height_px", "background", "blend", "masks"].map(|name| table[name].clone());
+    assert_eq!(header, [json!(300), json!(300), json!("#010203"), json!("translucent"), json!(2)]);
+    let spelt = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+    let flies = table["flies"].as_array().unwrap();
+    assert!(flies.iter().all(|fly| fly.as_object().unwrap().len() == COLUMNS.len()));
+    assert_all_flies(flies.iter().map(|fly| COLUMNS.iter().map(|column| spelt(&fly[column])).collect()));
+}
+
+#[test]
+fn a_table_is_known_by_how_it_begins() {
+    let workshop = Workshop::new();
+    let meta = json!({"key": "k", "note": "line\nbreak"}).as_object().unwrap().clone();
+    workshop.write("a.json", &encode_json(&population(), &fitness(), &meta).unwrap());
+    workshop.write("a.csv", &encode_csv(&population(), &fitness()).unwrap());
+    workshop
+        .write("empty.json", &encode_json(&Population { flies: vec![], ..population() }, &[], &Map::new()).unwrap());
+    workshop.write("other.json", b"{\"meta\": {\"key\": \"k\"}}");
+    assert_eq!(read_json_meta(&workshop.path("a.json")).unwrap(), Some(meta));
+    assert_eq!(read_json_meta(&workshop.path("empty.json")).unwrap(), Some(Map::new()));
+    for name in ["other.json", "a.csv", "photo.png"] {
+        assert_eq!(read_json_meta(&workshop.path(name)).unwrap(), None, "{name}");
+    }
+    assert!(read_json_meta(&workshop.path("missing.json")).is_err());
+    let tables = ["a.csv", "a.json", "photo.png", "missing.csv"].map(|name| is_csv_table(&workshop.path(name)));
+    assert_eq!(tables, [true, false, false, false]);
+}
