@@ -97,7 +97,7 @@ mod tests {
             let start: (i32, i32) = (x.parse().expect("a number"), y.parse().expect("a number"));
             let mut corners = vec![start];
             let steps = polygon[1 + first.len()..].split(['h', 'v']).skip(1);
-            for (letter, step) in polygon.chars().filter(|c| c.is_ascii_lowercase()).zip(steps) {
+            for (letter, step) in polygon.chars().filter(char::is_ascii_lowercase).zip(steps) {
                 let (x, y) = *corners.last().expect("the start");
                 let step: i32 = step.parse().expect("a number");
                 corners.push(if letter == 'h' { (x + step, y) } else { (x, y + step) });
