@@ -11,6 +11,7 @@ use super::gallery::GalleryArgs;
 use super::look::LookArgs;
 use super::paper::PaperArgs;
 use super::presets::{self, Preset};
+use super::render::RenderArgs;
 use super::scheme::SchemeArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
@@ -78,6 +79,9 @@ pub(super) enum Command {
     /// Turn the snapshots of an evolution into an animation
     /// Draws what `smalti evolve --save-run DIR` kept, in order and at any size.
     Timelapse(Box<TimelapseArgs>),
+    /// Draw a population again, at any size, or write it in another format
+    /// At the size at which it evolved the picture is the one that `evolve` wrote.
+    Render(Box<RenderArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
     /// Measure how much pictures are like a reference
@@ -102,7 +106,8 @@ pub(super) struct EvolveArgs {
     #[arg(value_name = "IN")]
     pub input: PathBuf,
 
-    /// Where to write the mosaic (.png, .jpg) or the population (.npz); may repeat; `-` writes a PNG to stdout
+    /// Where to write the mosaic (.png .jpg .webp .svg .ora) or the population (.npz .csv .json); may repeat; `-` writes a
+    /// PNG to stdout
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Longer side of the written picture, 1 to 65,535 px; the mosaic is drawn anew at that size [default: as evolved]
@@ -121,6 +126,7 @@ pub(super) struct EvolveArgs {
     #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
     pub save_every: Option<u64>,
     /// Replace outputs that are not smalti's or were made with other options
+    /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
     #[arg(long, help_heading = "Output")]
     pub force: bool,
     /// Only say what would be done; write nothing

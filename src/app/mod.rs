@@ -15,11 +15,13 @@ mod job;
 mod look;
 mod memory;
 mod options;
+mod outputs;
 mod paper;
 mod presets;
 mod progress;
 mod provenance;
 mod recorder;
+mod render;
 mod report;
 mod result;
 mod run;
@@ -42,6 +44,7 @@ pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
         cli::Command::Timelapse(args) => timelapse::make(args),
+        cli::Command::Render(args) => render::render(args),
         cli::Command::Devices(args) => devices::list(args),
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),

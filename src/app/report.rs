@@ -245,8 +245,8 @@ pub(super) fn say(line: &str) {
 
 /// Says that the CPU computes, to those who did not ask for it.
 pub(super) fn say_device(selected: &Selected) {
-    if let Selected::Cpu { reason: Some(reason) } = selected {
-        say(&format!("smalti: computing on the CPU, since {reason}"));
+    if let Some(note) = selected.note() {
+        say(&format!("smalti: {note}"));
     }
 }
 
@@ -256,7 +256,7 @@ pub(super) fn error(sentence: &str) {
 }
 
 /// The name of this machine.
-fn host_name() -> Option<String> {
+pub(super) fn host_name() -> Option<String> {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| std::env::var("HOSTNAME"));
     name.ok().map(|name| name.trim().to_owned()).filter(|name| !name.is_empty())
 }

@@ -16,11 +16,10 @@ use super::recorder::Recorder;
 use super::report::{self, Row, Status};
 use super::result::Evolved;
 use super::watch::{Watch, Watchers};
-use super::{curve_file, destination, memory, result, scheme};
+use super::{curve_file, destination, memory, outputs, provenance, result, scheme};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, Spread};
-use crate::metrics::Difference;
 use crate::model::Canvas;
 use crate::vk::ValidationLog;
 
@@ -81,9 +80,9 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let began = Instant::now();
     let status = evolved.ending.status;
     let outputs = outputs_to_write(options, &provenances, &evolved.ending);
-    let mut files = result::encode(&outputs, evolved, &provenances)?;
+    let mut files = outputs::encode(&outputs, evolved.drawn, &provenances.told(&evolved.ending))?;
     files.extend(result::encode_target(options, &job, &provenances.target)?);
-    let written = result::write(&files, &mut interrupt, &mut row.output);
+    let written = outputs::write(&files, options.overwrite, &mut interrupt, &mut row.output);
     let curve_written = curve.map_or(Ok(()), |curve| {
         let told = (&curve, row.id.as_str(), provenances.population.key());
         curve_file::write(&options.curves, told, &mut interrupt, &mut row.output)
@@ -103,7 +102,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
 fn begin_record(options: &EvolveOptions, job: &Job, provenances: &Provenances) -> Result<Option<Recorder>> {
     let Some(save_run) = &options.save_run else { return Ok(None) };
     let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
-    let told = provenances.population.snapshot_metadata();
+    let told = provenance::without_header(provenances.population.describe(None));
     Recorder::begin(save_run, births_planned, job.population(Vec::new()), told).map(Some)
 }
 
@@ -124,9 +123,15 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
     let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
     let output_pixel_count =
         output.map_or(pixel_count, |canvas| u64::from(canvas.width_px) * u64::from(canvas.height_px));
+    let written = output.map_or((width_px, height_px), |canvas| (canvas.width_px, canvas.height_px));
+    destination::check_fits_formats(&options.outputs, written)?;
     let list_bytes = job.init.as_ref().map_or(0, memory::list_bytes);
-    let needed_bytes =
-        memory::estimate_bytes(pixel_count, job.fly_count, output_pixel_count).saturating_add(list_bytes);
+    let needed_bytes = memory::estimate_bytes(
+        pixel_count,
+        job.fly_count,
+        output_pixel_count * destination::memory_weight(&options.outputs),
+    )
+    .saturating_add(list_bytes);
     memory::check(needed_bytes)?;
     Ok(needed_bytes)
 }
@@ -195,14 +200,14 @@ fn evolve_job(
     let ending = Ending::of(evolution);
     let population = job.population(evolution.best_flies().to_vec());
     let evolved = result::draw(engine.evaluator(), options, population, ending)?;
-    row.psnr = Difference::between(&evolved.mosaic.pixels, job.target.pixels()).psnr_db();
+    row.psnr = evolved.psnr_db;
     drop(engine);
     validation_log.map_or(Ok(()), |log| check_messages(&log))?;
     Ok(evolved)
 }
 
 /// Turns what the validation layer said into an error.
-fn check_messages(log: &ValidationLog) -> Result<()> {
+pub(super) fn check_messages(log: &ValidationLog) -> Result<()> {
     let messages = log.messages();
     let Some(first) = messages.first() else { return Ok(()) };
     let first = first.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -16,6 +16,7 @@ mod layout;
 mod looks;
 mod paper;
 mod reference;
+mod render;
 mod scenarios;
 mod schemes;
 mod score;

@@ -22,7 +22,7 @@ use super::device::{self, Opened};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::progress::{Progress, Stage, short_time};
 use super::snapshots::{self, Snapshot};
-use super::{memory, report, result, run};
+use super::{memory, outputs, report, run};
 use crate::archive;
 use crate::error::{Error, Result};
 use crate::model::{Canvas, Evaluator, MaskSet, Mosaic, Population, Rgb, Scene, Target};
@@ -191,7 +191,7 @@ impl Studio {
             evaluator,
             size_px: (width_px, height_px),
             canvas,
-            supersampling: if is_resized { result::supersampling(long_side_px, evolved_px) } else { 1 },
+            supersampling: if is_resized { outputs::usual_supersampling(long_side_px, evolved_px) } else { 1 },
             background: options.background,
         })
     }
