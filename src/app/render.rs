@@ -13,6 +13,7 @@ use sha2::{Digest, Sha256};
 use super::destination::{self, Destination};
 use super::device::{self, Opened, Selected};
 use super::interrupt::Interrupt;
+use super::look::{Dress, Look, LookArgs};
 use super::options::{self, Overwrite, Verbosity};
 use super::outputs::{self, Drawn, SUPERSAMPLING_MAX, Told, View};
 use super::provenance::{self, Provenance};
@@ -20,7 +21,7 @@ use super::report::{self, Status};
 use super::{memory, run, values};
 use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
-use crate::evolve::ALGORITHM_VERSION;
+use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Population, Rgb, Scene, Target};
 use crate::vk::{DeviceRequest, Validation};
@@ -29,6 +30,7 @@ const EXAMPLES: &str = "\
 Examples:
   smalti render flies.npz -o poster.png --output-size 4096
   smalti render flies.npz -o mosaic.svg -o layers.ora
+  smalti render flies.npz -o flowers.png --mask flower --shader emboss --output-size 2048
   smalti render flies.npz -o paper.webp --background white --supersample 8";
 
 #[derive(Debug, Args)]
@@ -59,6 +61,9 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Picture")]
     pub supersample: Option<u64>,
 
+    #[command(flatten)]
+    pub look: LookArgs,
+
     /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
     #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]
     pub device: String,
@@ -87,6 +92,8 @@ struct RenderOptions {
     output_long_side_px: Option<u32>,
     /// `None` means the one of the population.
     background: Option<Rgb>,
+    /// The masks that the tiles wear instead of their own.
+    look: Option<Look>,
     /// `None` means what the size asks for.
     supersampling: Option<u32>,
     device: DeviceRequest,
@@ -106,6 +113,7 @@ impl RenderOptions {
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
             output_long_side_px: args.output_size.map(|px| options::side_px("--output-size", px)).transpose()?,
             background: args.background,
+            look: look(&args.look)?,
             supersampling: supersampling.transpose()?.map(|count| count as u32),
             device: options::device(&args.device, validation)?,
             validation,
@@ -145,6 +153,16 @@ impl RenderOptions {
         view.supersampling = supersampling;
         Ok(view)
     }
+}
+
+/// The masks that were asked for, if any.
+fn look(args: &LookArgs) -> Result<Option<Look>> {
+    if args.masks.is_empty() && (args.shader.is_some() || args.blend.is_some() || args.opacity.is_some()) {
+        let sentence =
+            "a population keeps its masks as they were shaded and blended; name the mask to draw with --mask";
+        return Err(Error::Usage(sentence.to_owned()));
+    }
+    if args.masks.is_empty() { Ok(None) } else { Look::new(args, &[], None).map(Some) }
 }
 
 /// The result of a rendering; fields that `evolve` has too mean the same.
@@ -202,11 +220,15 @@ fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
     row.device = Some(selected.label().to_owned());
 
     let began = Instant::now();
-    let Archive { population, fitness, meta } = archive::read(&options.input)?;
+    let Archive { population, mut fitness, meta } = archive::read(&options.input)?;
     if population.flies.is_empty() {
         return Err(Error::input(&options.input, "holds no flies; give a population of at least one"));
     }
-    let population = adapted(population, options);
+    let population = adapted(population, options)?;
+    if options.look.is_some() {
+        // It is that of other tiles, and there is no target to measure it anew.
+        fitness.fill(0);
+    }
     row.load_ms = report::milliseconds(began.elapsed());
     row.tiles = Some(population.flies.len());
     if let Some(note) = selected.note().filter(|_| options.verbosity > Verbosity::Quiet) {
@@ -242,9 +264,15 @@ fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
 }
 
 /// The population as the options want it to look; whatever they change is in its key.
-fn adapted(mut population: Population, options: &RenderOptions) -> Population {
+fn adapted(mut population: Population, options: &RenderOptions) -> Result<Population> {
     population.background = options.background.unwrap_or(population.background);
-    population
+    if let Some(look) = &options.look {
+        let Dress { masks, layers_by_run } = look.dress()?;
+        let worn = PaperScheme { masks: layers_by_run, ..PaperScheme::default() };
+        population.flies = begin_from(&worn, population.flies);
+        population.masks = masks;
+    }
+    Ok(population)
 }
 
 /// Refuses pictures that their formats or the memory cannot hold.
