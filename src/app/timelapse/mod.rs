@@ -92,7 +92,7 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
         .into_iter()
         .map(|film| film.and_then(Film::finish).and_then(|file| interrupt.while_writing(|| file.commit())))
         .collect();
-    if !options.is_quiet {
+    if !options.is_quiet && written.iter().any(Result::is_ok) {
         let paths = options.outputs.iter().zip(&written).filter(|(_, written)| written.is_ok());
         let paths: Vec<String> = paths.map(|(output, _)| output.path.display().to_string()).collect();
         say_written(&paths, snapshots.len(), &studio.canvas, options);
@@ -103,9 +103,12 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
 fn say_written(paths: &[String], frame_count: usize, canvas: &Canvas, options: &TimelapseOptions) {
     let timing = options.timing(frame_count);
     let seconds = (frame_count - 1) as f64 / f64::from(timing.frames_per_s) + f64::from(timing.last_cs) / 100.0;
-    let written = if paths.is_empty() { "nothing".to_owned() } else { paths.join(", ") };
+    let frames = if frame_count == 1 { "frame" } else { "frames" };
     let (width_px, height_px) = (canvas.width_px, canvas.height_px);
-    report::say(&format!("wrote {written}: {frame_count} frames of {width_px}x{height_px} px, {seconds:.1} s"));
+    report::say(&format!(
+        "wrote {}: {frame_count} {frames} of {width_px}x{height_px} px, {seconds:.1} s",
+        paths.join(", ")
+    ));
 }
 
 /// Draws the snapshots and gives each to all films, which are returned with what became of them.
