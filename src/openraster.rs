@@ -186,7 +186,8 @@ mod tests {
 
     #[test]
     fn bands_hold_equally_many_living_flies_and_together_all_of_them() {
-        let fly = |index: u32| Fly { z: 97 * index % 101, x: index as i32, alive: index % 5 != 0, ..Fly::ABSENT };
+        let fly =
+            |index: u32| Fly { z: 97 * index % 101, x: index as i32, alive: !index.is_multiple_of(5), ..Fly::ABSENT };
         let flies: Vec<Fly> = (0..101).map(fly).collect();
         let bands = bands(&flies, 8);
         assert_eq!(bands.iter().map(Vec::len).collect::<Vec<_>>(), [10; 8]);

@@ -82,7 +82,7 @@ mod tests {
         assert_eq!(outline(&Mask::square()), "M-128 -128h256v256h-256z");
         assert_eq!(outline(&mask_of(|_, _| false)), "");
         let ring = mask_of(|x, y| (0..3).contains(&x) && (0..3).contains(&y) && (x, y) != (1, 1));
-        assert_eq!(outline(&ring), "M-128 -128h3v3h-3zM-127 -126v-1h1v1z");
+        assert_eq!(outline(&ring), "M-128 -128h3v3h-3zM-127 -126h1v-1h-1z");
         let diagonal = mask_of(|x, y| x < 2 && y < 2 && x == y);
         assert_eq!(outline(&diagonal), "M-128 -128h1v1h-1zM-127 -127h1v1h-1z");
     }
@@ -97,7 +97,7 @@ mod tests {
             let start: (i32, i32) = (x.parse().expect("a number"), y.parse().expect("a number"));
             let mut corners = vec![start];
             let steps = polygon[1 + first.len()..].split(['h', 'v']).skip(1);
-            for (letter, step) in polygon.chars().filter(|c| c.is_ascii_lowercase()).zip(steps) {
+            for (letter, step) in polygon.chars().filter(char::is_ascii_lowercase).zip(steps) {
                 let (x, y) = *corners.last().expect("the start");
                 let step: i32 = step.parse().expect("a number");
                 corners.push(if letter == 'h' { (x + step, y) } else { (x, y + step) });

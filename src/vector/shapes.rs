@@ -48,7 +48,7 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, blend: Blend) ->
     let is_shaded = mask.texels().iter().any(|texel| is_there(texel) && texel.shade < 255);
     let shade = if is_shaded {
         let black = |texel: &Texel| [0, 0, 0, if is_there(texel) { 255 - texel.shade } else { 0 }];
-        picture(mask.texels().iter().map(black).collect())?
+        picture(&mask.texels().iter().map(black).collect::<Vec<_>>())?
     } else {
         String::new()
     };
@@ -69,7 +69,8 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, blend: Blend) ->
         }
         Blend::Translucent => {
             // White with alpha: luminance and alpha agree in whatever colour space they are taken.
-            let coverage = picture(mask.texels().iter().map(|texel| [255, 255, 255, texel.coverage]).collect())?;
+            let white: Vec<[u8; 4]> = mask.texels().iter().map(|texel| [255, 255, 255, texel.coverage]).collect();
+            let coverage = picture(&white)?;
             push(
                 svg,
                 format_args!(
@@ -84,8 +85,8 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, blend: Blend) ->
 }
 
 /// A picture of texels with hard edges: `pixelated` is the word of browsers, the attribute that of SVG 1.1.
-fn picture(texels: Vec<[u8; 4]>) -> Result<String> {
-    let png = photo::encode_png_with_alpha(MASK_SIDE as u32, MASK_SIDE as u32, &texels)?;
+fn picture(texels: &[[u8; 4]]) -> Result<String> {
+    let png = photo::encode_png_with_alpha(MASK_SIDE as u32, MASK_SIDE as u32, texels)?;
     Ok(format!(
         "<image x=\"-128\" y=\"-128\" width=\"256\" height=\"256\" image-rendering=\"optimizeSpeed\" \
          style=\"image-rendering:pixelated\" xlink:href=\"data:image/png;base64,{}\"/>",
