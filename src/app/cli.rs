@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::render::RenderArgs;
 use super::{report, values};
 use crate::model::Rgb;
 
@@ -61,6 +62,10 @@ pub(super) enum Command {
     /// Thousands of coloured tiles are bred, one death and one birth at a time, until together they look like the
     /// picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Draw a population again, at any size, or write it in another format
+    ///
+    /// At the size at which it evolved the picture is the one that `evolve` wrote.
+    Render(Box<RenderArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
 }
@@ -80,7 +85,8 @@ pub(super) struct EvolveArgs {
     #[arg(value_name = "IN")]
     pub input: PathBuf,
 
-    /// Where to write the mosaic (.png, .jpg) or the population (.npz); may repeat; `-` writes a PNG to stdout
+    /// Where to write the mosaic (.png .jpg .webp .svg .ora) or the population (.npz .csv .json); may repeat; `-` writes a
+    /// PNG to stdout
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Longer side of the written picture, 1 to 65,535 px; the mosaic is drawn anew at that size [default: as evolved]
@@ -89,7 +95,7 @@ pub(super) struct EvolveArgs {
     /// Also write the picture that was evolved towards, fitted to size, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
-    /// Replace outputs that are not smalti's or were made with other options
+    /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
     #[arg(long, help_heading = "Output")]
     pub force: bool,
     /// Only say what would be done; write nothing

@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 
 use super::options::Overwrite;
 use super::provenance::{self, Ending};
+use crate::archive;
 use crate::error::{Error, Result};
 use crate::output;
+use crate::photo::WEBP_SIDE_MAX_PX;
 
 /// What is written to a destination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +18,18 @@ pub(super) enum Content {
     Png,
     /// A picture as JPEG.
     Jpeg,
+    /// A picture as WebP.
+    WebP,
+    /// A picture as vectors.
+    Svg,
+    /// A picture in layers.
+    OpenRaster,
     /// The population.
     Population,
+    /// A table of the flies, with metadata.
+    Json,
+    /// A table of the flies and nothing else.
+    Csv,
 }
 
 /// A file, or stdout as `-`.
@@ -36,11 +48,18 @@ impl Destination {
         let content = match extension.as_str() {
             "png" => Content::Png,
             "jpg" | "jpeg" => Content::Jpeg,
+            "webp" => Content::WebP,
+            "svg" => Content::Svg,
+            "ora" => Content::OpenRaster,
             "npz" => Content::Population,
+            "json" => Content::Json,
+            "csv" => Content::Csv,
             _ if path == Path::new("-") => Content::Png,
             _ => {
-                let path = path.display();
-                return Err(Error::Usage(format!("{path}: an output must end in .png, .jpg, .jpeg or .npz, or be -")));
+                return Err(Error::Usage(format!(
+                    "{}: an output must end in .png, .jpg, .jpeg, .webp, .svg, .ora, .npz, .json or .csv, or be -",
+                    path.display()
+                )));
             }
         };
         Ok(Self { path: path.to_owned(), content })
@@ -64,9 +83,49 @@ impl Destination {
         self.is_stdout() || self.path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir())
     }
 
-    /// Whether a picture is written, rather than a population.
+    /// Whether a picture is written, which has a size, rather than a population, which has none.
     pub(super) fn is_picture(&self) -> bool {
-        self.content != Content::Population
+        !matches!(self.content, Content::Population | Content::Json | Content::Csv)
+    }
+
+    /// Whether pixels are written.
+    pub(super) fn is_raster(&self) -> bool {
+        self.is_picture() && self.content != Content::Svg
+    }
+
+    /// Whether a regular file is there that would be replaced.
+    fn replaces_file(&self) -> bool {
+        // Devices and pipes are not replaced.
+        !self.is_stdout() && self.path.is_file()
+    }
+}
+
+/// Refuses a size of pictures where no output is one.
+pub(super) fn check_size_has_use(outputs: &[Destination], long_side_px: Option<u32>) -> Result<()> {
+    match long_side_px {
+        Some(long_side_px) if !outputs.iter().any(Destination::is_picture) => Err(Error::Usage(format!(
+            "--output-size {long_side_px}: a population has no size; add a picture as an output, or drop the flag"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// How many times the memory of one picture it takes to draw and encode the largest of `outputs`: a layer is drawn twice,
+/// cut out and encoded beside what is encoded already.
+pub(super) fn memory_weight(outputs: &[Destination]) -> u64 {
+    if outputs.iter().any(|output| output.content == Content::OpenRaster) { 3 } else { 1 }
+}
+
+/// Refuses pictures that are too large for the format of one of `outputs`.
+pub(super) fn check_fits_formats(outputs: &[Destination], (width_px, height_px): (u32, u32)) -> Result<()> {
+    let webp = outputs.iter().find(|output| output.content == Content::WebP);
+    match webp {
+        Some(output) if width_px.max(height_px) > WEBP_SIDE_MAX_PX => Err(Error::Usage(format!(
+            "{}: a WebP has at most {WEBP_SIDE_MAX_PX} px a side, and this is {width_px}x{height_px} px; write a .png, or \
+             a smaller --output-size",
+            output.path.display()
+        ))),
+        _ => Ok(()),
     }
 }
 
@@ -102,13 +161,16 @@ pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destinat
 }
 
 /// Refuses to replace a file that the same command, perhaps interrupted, would not have written.
+///
+/// A CSV table cannot tell which command wrote it: here any table of flies passes, and [`check_unchanged`] decides once
+/// the new bytes are known.
 pub(super) fn check_replaceable(destination: &Destination, key: &str, overwrite: Overwrite) -> Result<()> {
-    // Devices and pipes are not replaced.
-    if overwrite == Overwrite::Force || destination.is_stdout() || !destination.path.is_file() {
+    if overwrite == Overwrite::Force || !destination.replaces_file() {
         return Ok(());
     }
     let why = match provenance::story_of_file(destination) {
         Some(found) if found.key == key => return Ok(()),
+        None if destination.content == Content::Csv && archive::is_csv_table(&destination.path) => return Ok(()),
         Some(_) => "made with other options",
         None => "not made by smalti",
     };
@@ -116,10 +178,21 @@ pub(super) fn check_replaceable(destination: &Destination, key: &str, overwrite:
     Err(Error::Usage(format!("{path} exists and was {why}; name another file, or replace it with --force")))
 }
 
+/// Refuses to replace a CSV table by another one.
+pub(super) fn check_unchanged(destination: &Destination, bytes: &[u8], overwrite: Overwrite) -> Result<()> {
+    let may_differ =
+        overwrite == Overwrite::Force || destination.content != Content::Csv || !destination.replaces_file();
+    if may_differ || std::fs::read(&destination.path).is_ok_and(|old| old == bytes) {
+        return Ok(());
+    }
+    let reason = "holds another table, which is kept; name another file, or replace it with --force";
+    Err(Error::output(&destination.path, reason))
+}
+
 /// Whether the file that is there holds a better result of the same command, which must not be lost: a run may end
 /// earlier than the one before it, by Ctrl-C or by the clock.
 pub(super) fn should_keep(destination: &Destination, key: &str, ending: &Ending, overwrite: Overwrite) -> bool {
-    if overwrite == Overwrite::Force || destination.is_stdout() || !destination.path.is_file() {
+    if overwrite == Overwrite::Force || !destination.replaces_file() {
         return false;
     }
     provenance::story_of_file(destination).is_some_and(|found| found.key == key && found.is_better_than(ending))

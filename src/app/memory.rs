@@ -16,6 +16,8 @@ const BYTES_PER_OUTPUT_PIXEL: u64 = 10;
 const BYTES_PER_ENTRY: u64 = 16;
 /// Least side in px of a block.
 const BLOCK_SIDE_PX: i32 = 8;
+/// Least side in samples of a patch that is drawn at once.
+const PATCH_SIDE_PX: i32 = 240;
 
 /// About how many bytes the block lists of a population take. The estimate per fly knows tiles of the usual size only,
 /// and a population from a file may hold others.
@@ -24,6 +26,16 @@ pub(super) fn list_bytes(population: &Population) -> u64 {
     let blocks = |first: i32, last: i32| (last / BLOCK_SIDE_PX - first / BLOCK_SIDE_PX + 1) as u64;
     let tiles = population.flies.iter().map(|fly| Tile::bake(fly, &canvas)).filter(|tile| tile.x0 <= tile.x1);
     tiles.map(|tile| blocks(tile.x0, tile.x1) * blocks(tile.y0, tile.y1)).sum::<u64>() * BYTES_PER_ENTRY
+}
+
+/// About how many bytes it takes to draw a population: the list of each patch of `samples`, the flies, and the picture of
+/// `pixel_count` pixels.
+pub(super) fn drawing_bytes(population: &Population, samples: &Canvas, pixel_count: u64) -> u64 {
+    let patches = |first: i32, last: i32| (last / PATCH_SIDE_PX - first / PATCH_SIDE_PX + 1) as u64;
+    let tiles = population.flies.iter().map(|fly| Tile::bake(fly, samples)).filter(|tile| !tile.is_empty());
+    let entries: u64 = tiles.map(|tile| patches(tile.x0, tile.x1) * patches(tile.y0, tile.y1)).sum();
+    let fly_bytes = population.flies.len() as u64 * BYTES_PER_FLY;
+    entries * BYTES_PER_ENTRY + fly_bytes + pixel_count.saturating_mul(BYTES_PER_OUTPUT_PIXEL)
 }
 
 /// About how many bytes an evolution needs.

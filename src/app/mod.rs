@@ -11,8 +11,10 @@ mod interrupt;
 mod job;
 mod memory;
 mod options;
+mod outputs;
 mod progress;
 mod provenance;
+mod render;
 mod report;
 mod result;
 mod run;
@@ -28,6 +30,7 @@ pub use cli::Cli;
 pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
+        cli::Command::Render(args) => render::render(args),
         cli::Command::Devices(args) => devices::list(args),
     }
 }

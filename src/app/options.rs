@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
-use super::destination::Destination;
+use super::destination::{self, Destination};
 use crate::error::{Error, Result};
 use crate::evolve::{OnDry, PaperScheme};
 use crate::model::Rgb;
@@ -73,16 +73,10 @@ impl EvolveOptions {
     /// # Errors
     /// [`Error::Usage`] that names the flag and what it may be.
     pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
-        let sides = (1, u64::from(TARGET_SIDE_MAX_PX));
-        let side_px = |flag, px| in_range(flag, px, sides).map(|px| px as u32);
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
-        let threads = args.threads.map(|count| in_range("--threads", count, (1, THREADS_MAX))).transpose()?;
-        let device = device(&args.device)?;
-        if args.validate && device == DeviceRequest::Cpu {
-            return Err(Error::Usage(
-                "--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned(),
-            ));
-        }
+        let threads = threads(args.threads)?;
+        let validation = if args.validate { Validation::On } else { Validation::Off };
+        let device = device(&args.device, validation)?;
         let options = Self {
             input: args.input.clone(),
             outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
@@ -97,14 +91,15 @@ impl EvolveOptions {
             scheme: scheme(args)?,
             time_limit: args.time,
             device,
-            validation: if args.validate { Validation::On } else { Validation::Off },
-            threads: threads.map(|count| count as usize),
+            validation,
+            threads,
             progress: progress(args),
             verbosity: verbosity(args),
         };
-        if args.json && options.outputs.iter().any(Destination::is_stdout) {
-            return Err(Error::Usage("-o - and --json both write to stdout; drop one of them".to_owned()));
+        if args.json {
+            check_stdout_is_free(&options.outputs)?;
         }
+        destination::check_size_has_use(&options.outputs, options.output_long_side_px)?;
         Ok(options)
     }
 
@@ -114,8 +109,35 @@ impl EvolveOptions {
     }
 }
 
-/// The device that was asked for; no word at all, as in an empty SMALTI_DEVICE, asks for none.
-fn device(text: &str) -> Result<DeviceRequest> {
+/// The value of a flag that is a side of a picture.
+pub(super) fn side_px(flag: &str, px: u64) -> Result<u32> {
+    in_range(flag, px, (1, u64::from(TARGET_SIDE_MAX_PX))).map(|px| px as u32)
+}
+
+/// The value of `--threads`.
+pub(super) fn threads(count: Option<u64>) -> Result<Option<usize>> {
+    count.map(|count| in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize)).transpose()
+}
+
+/// Refuses a picture on the stdout that the row of `--json` goes to.
+pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
+    if outputs.iter().any(Destination::is_stdout) {
+        return Err(Error::Usage("-o - and --json both write to stdout; drop one of them".to_owned()));
+    }
+    Ok(())
+}
+
+/// The device that was asked for; it must be one that can be watched, if it is to be.
+pub(super) fn device(text: &str, validation: Validation) -> Result<DeviceRequest> {
+    let device = device_request(text)?;
+    if validation == Validation::On && device == DeviceRequest::Cpu {
+        return Err(Error::Usage("--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned()));
+    }
+    Ok(device)
+}
+
+/// What the word asks for; none at all, as in an empty SMALTI_DEVICE, asks for nothing.
+fn device_request(text: &str) -> Result<DeviceRequest> {
     let text = text.trim();
     if text.is_empty() {
         return Ok(DeviceRequest::Auto);
@@ -167,7 +189,7 @@ fn verbosity(args: &EvolveArgs) -> Verbosity {
     }
 }
 
-fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
+pub(super) fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
     if (least..=most).contains(&value) {
         Ok(value)
     } else if most == u64::MAX {

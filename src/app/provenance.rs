@@ -9,12 +9,15 @@ use sha2::{Digest, Sha256};
 use super::destination::{Content, Destination};
 use super::job::Job;
 use super::options::EvolveOptions;
+use super::outputs::Told;
 use super::report::Status;
 use crate::archive;
 use crate::error::Result;
 use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
 use crate::model::{Blend, Population};
+use crate::openraster;
 use crate::photo::{self, Metadata};
+use crate::vector;
 
 /// The program's name in metadata.
 const SOFTWARE: &str = "smalti";
@@ -82,6 +85,11 @@ impl Provenances {
         if options.outputs.iter().any(Destination::is_picture) { &self.picture } else { &self.population }
     }
 
+    /// What the outputs tell of an evolution that ended like `ending`.
+    pub(super) fn told(&self, ending: &Ending) -> Told {
+        Told { picture: self.picture.describe(Some(ending)), population: self.population.describe(Some(ending)) }
+    }
+
     /// The one of an output of the evolution.
     pub(super) fn of_output(&self, output: &Destination) -> &Provenance {
         if output.is_picture() { &self.picture } else { &self.population }
@@ -131,6 +139,11 @@ impl Provenance {
         if let Value::Object(specific) = specific {
             decisive.extend(specific);
         }
+        Self::of(decisive)
+    }
+
+    /// The provenance of what `decisive` decides.
+    pub(super) fn of(mut decisive: Map<String, Value>) -> Self {
         // The order of the keys must not depend on the map that holds them.
         decisive.sort_keys();
         let key = hexadecimal(&Sha256::digest(Value::Object(decisive.clone()).to_string()));
@@ -160,20 +173,18 @@ impl Provenance {
         told.sort_keys();
         told
     }
+}
 
-    /// The metadata of a picture file.
-    pub(super) fn picture_metadata(&self, ending: Option<&Ending>) -> Metadata {
-        let software = format!("{SOFTWARE} {}", env!("CARGO_PKG_VERSION"));
-        let told = Value::Object(self.describe(ending)).to_string();
-        vec![("Software".to_owned(), software), (KEYWORD.to_owned(), told)]
-    }
+/// The metadata of a picture file that tells `told`.
+pub(super) fn picture_metadata(told: &Map<String, Value>) -> Metadata {
+    let software = format!("{SOFTWARE} {}", env!("CARGO_PKG_VERSION"));
+    vec![("Software".to_owned(), software), (KEYWORD.to_owned(), Value::Object(told.clone()).to_string())]
+}
 
-    /// The metadata of a population file, without what its header tells anyway.
-    pub(super) fn population_metadata(&self, ending: &Ending) -> Map<String, Value> {
-        let mut told = self.describe(Some(ending));
-        told.retain(|key, _| !HEADER_KEYS.contains(&key.as_str()));
-        told
-    }
+/// The metadata of a population file that tells `told`, without what its header tells anyway.
+pub(super) fn without_header(mut told: Map<String, Value>) -> Map<String, Value> {
+    told.retain(|key, _| !HEADER_KEYS.contains(&key.as_str()));
+    told
 }
 
 /// What a file tells about the result in it.
@@ -201,9 +212,14 @@ impl Story {
 
 /// The story of the file at a destination, if smalti wrote it.
 pub(super) fn story_of_file(destination: &Destination) -> Option<Story> {
+    let path = &destination.path;
     let told = match destination.content {
-        Content::Population => archive::read_meta(&destination.path).ok()?,
-        Content::Png | Content::Jpeg => picture_description(photo::read_metadata(&destination.path)).ok()??,
+        Content::Population => archive::read_meta(path).ok()?,
+        Content::Json => archive::read_json_meta(path).ok()??,
+        Content::Png | Content::Jpeg | Content::WebP => picture_description(photo::read_metadata(path)).ok()??,
+        Content::OpenRaster => picture_description(openraster::read_metadata(path)).ok()??,
+        Content::Svg => vector::read_meta(path).ok()??,
+        Content::Csv => return None,
     };
     let text = |key| told.get(key).and_then(Value::as_str);
     let key = text("key").filter(|_| text("software") == Some(SOFTWARE))?.to_owned();
@@ -226,7 +242,7 @@ fn on_dry_name(on_dry: OnDry) -> &'static str {
 }
 
 /// SHA-256 over what evolves from a population: its flies and masks, whatever file held them.
-fn population_sha256(population: &Population) -> String {
+pub(super) fn population_sha256(population: &Population) -> String {
     let mut hash = Sha256::new();
     for fly in &population.flies {
         let genes = [fly.x as u32, fly.y as u32, fly.z, fly.w, fly.h];
@@ -243,7 +259,7 @@ fn population_sha256(population: &Population) -> String {
     hexadecimal(&hash.finalize())
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
+pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

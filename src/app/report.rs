@@ -264,7 +264,7 @@ pub(super) fn error(sentence: &str) {
 }
 
 /// The name of this machine.
-fn host_name() -> Option<String> {
+pub(super) fn host_name() -> Option<String> {
     let name = std::fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| std::env::var("HOSTNAME"));
     name.ok().map(|name| name.trim().to_owned()).filter(|name| !name.is_empty())
 }

@@ -14,7 +14,7 @@ use super::provenance::{Ending, Provenances};
 use super::report::{self, Row, Status};
 use super::result::Evolved;
 use super::watch::Watch;
-use super::{destination, memory, result};
+use super::{destination, memory, outputs, result};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
@@ -70,9 +70,9 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let began = Instant::now();
     let status = evolved.ending.status;
     let outputs = outputs_to_write(options, &provenances, &evolved.ending);
-    let mut files = result::encode(&outputs, evolved, &provenances)?;
+    let mut files = outputs::encode(&outputs, evolved.drawn, &provenances.told(&evolved.ending))?;
     files.extend(result::encode_target(options, &job, &provenances.target)?);
-    result::write(&files, &mut interrupt, &mut row.output)?;
+    outputs::write(&files, options.overwrite, &mut interrupt, &mut row.output)?;
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {
@@ -82,7 +82,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
 }
 
 /// Gives the CPU twin as many threads as were asked for.
-fn start_threads(count: Option<usize>) -> Result<()> {
+pub(super) fn start_threads(count: Option<usize>) -> Result<()> {
     let Some(count) = count else { return Ok(()) };
     rayon::ThreadPoolBuilder::new()
         .num_threads(count)
@@ -104,9 +104,15 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
     let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
     let output_pixel_count =
         output.map_or(pixel_count, |canvas| u64::from(canvas.width_px) * u64::from(canvas.height_px));
+    let written = output.map_or((width_px, height_px), |canvas| (canvas.width_px, canvas.height_px));
+    destination::check_fits_formats(&options.outputs, written)?;
     let list_bytes = job.init.as_ref().map_or(0, memory::list_bytes);
-    let needed_bytes =
-        memory::estimate_bytes(pixel_count, job.fly_count, output_pixel_count).saturating_add(list_bytes);
+    let needed_bytes = memory::estimate_bytes(
+        pixel_count,
+        job.fly_count,
+        output_pixel_count * destination::memory_weight(&options.outputs),
+    )
+    .saturating_add(list_bytes);
     memory::check(needed_bytes)?;
     Ok(needed_bytes)
 }
@@ -141,8 +147,8 @@ fn say_notes(job: &Job, options: &EvolveOptions, selected: &Selected) {
     for warning in &job.warnings {
         report::say(&format!("smalti: {}: {warning}", options.input.display()));
     }
-    if let Selected::Cpu { reason: Some(reason) } = selected {
-        report::say(&format!("smalti: computing on the CPU, since {reason}"));
+    if let Some(note) = selected.note() {
+        report::say(&format!("smalti: {note}"));
     }
 }
 
@@ -174,14 +180,14 @@ fn evolve_job(
         flies: evolution.best_flies().to_vec(),
     };
     let evolved = result::draw(engine.evaluator(), options, population, ending)?;
-    row.psnr = report::psnr_db(&evolved.mosaic, &job.target);
+    row.psnr = evolved.psnr_db;
     drop(engine);
     validation_log.map_or(Ok(()), |log| check_messages(&log))?;
     Ok(evolved)
 }
 
 /// Turns what the validation layer said into an error.
-fn check_messages(log: &ValidationLog) -> Result<()> {
+pub(super) fn check_messages(log: &ValidationLog) -> Result<()> {
     let messages = log.messages();
     let Some(first) = messages.first() else { return Ok(()) };
     let first = first.split_whitespace().collect::<Vec<_>>().join(" ");

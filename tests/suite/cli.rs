@@ -31,7 +31,7 @@ fn a_picture_becomes_a_mosaic_as_png_jpeg_and_population() {
 #[test]
 fn the_same_seed_gives_the_same_bytes_and_another_seed_others() {
     let workshop = Workshop::new();
-    for ending in ["png", "jpg", "npz"] {
+    for ending in ["png", "jpg", "webp", "svg", "ora", "npz", "csv", "json"] {
         workshop.evolve(&format!("-o a.{ending} --seed 7"));
         workshop.evolve(&format!("-o b.{ending} --seed 7"));
         workshop.evolve(&format!("-o c.{ending} --seed 8"));

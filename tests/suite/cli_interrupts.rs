@@ -59,13 +59,16 @@ fn the_same_command_may_replace_a_partial_result_and_another_may_not() {
 fn a_partial_result_replaces_no_complete_one_and_force_asks_for_just_that() {
     let workshop = Workshop::new();
     // The clock decides how far the first one gets; the second is interrupted before that.
-    let command = format!("{ENDLESS} --time 4s -o a.png -o a.npz");
+    let command = format!("{ENDLESS} --time 4s -o a.png -o a.npz -o a.webp -o a.svg -o a.ora -o a.json");
     assert_eq!(workshop.run(&command).code, Some(0));
     let (picture, population) = (workshop.read("a.png"), workshop.read("a.npz"));
     std::fs::remove_file(workshop.path("a.png")).unwrap();
     let (status, messages) = interrupted(&workshop, &command, &["INT"]);
     assert_eq!(status.code(), Some(75), "{messages}");
-    assert!(messages.contains("a.npz is kept") && messages.contains("wrote a.png (partial"), "{messages}");
+    for ending in ["npz", "webp", "svg", "ora", "json"] {
+        assert!(messages.contains(&format!("a.{ending} is kept")), "{messages}");
+    }
+    assert!(messages.contains("wrote a.png (partial"), "{messages}");
     assert_eq!(workshop.read("a.npz"), population);
     assert_ne!(workshop.read("a.png"), picture);
     assert_eq!(interrupted(&workshop, &format!("{command} --force"), &["INT"]).0.code(), Some(75));

@@ -3,7 +3,7 @@
 use crate::workshop::{Ran, Workshop};
 
 /// Runs the program, which must fail with `code` and one sentence that holds `words`, and leave no file.
-fn refused(workshop: &Workshop, line: &str, code: i32, words: &str) -> Ran {
+pub fn refused(workshop: &Workshop, line: &str, code: i32, words: &str) -> Ran {
     let before = workshop.files();
     let ran = workshop.run(line);
     assert_eq!(ran.code, Some(code), "{line}: {}", ran.stderr);
@@ -118,6 +118,8 @@ fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
         ("-o photo.png --force", 2, "is the input"),
         ("-o a.png --save-target ./photo.png --force", 2, "is the input"),
         ("-o - --json", 2, "stdout"),
+        ("-o a.npz -o a.csv -o a.json --output-size 9", 2, "--output-size 9: a population has no size"),
+        ("-o a.webp --output-size 16384", 2, "a.webp: a WebP has at most 16383 px a side"),
         ("-o nowhere/a.png", 1, "nowhere/a.png"),
         ("-o folder.png", 1, "folder.png"),
         ("-o new.png/", 1, "new.png/: is a folder"),
@@ -165,7 +167,7 @@ fn populations_that_do_not_fit_are_refused() {
 fn only_force_replaces_what_the_same_command_would_not_have_written() {
     let workshop = Workshop::new();
     let command = "evolve photo.png -n 60 --births 100";
-    for ending in ["png", "jpg", "npz"] {
+    for ending in ["png", "jpg", "webp", "svg", "ora", "npz", "json"] {
         let name = format!("a.{ending}");
         workshop.write(&name, b"written by somebody else");
         refused(&workshop, &format!("{command} -o {name}"), 2, &format!("{name} exists and was not made by smalti"));

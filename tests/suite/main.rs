@@ -13,6 +13,7 @@ mod files;
 mod layering;
 mod layout;
 mod reference;
+mod render;
 mod scenarios;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
