@@ -137,7 +137,7 @@ fn present(
         originals.push(super::grid::original_cell(figure, name));
     }
     let mut rows = vec![("original".to_owned(), originals)];
-    let mut table = FigureTable { head: heads(&["made by", "picture"]), rows: Vec::new() };
+    let mut table = FigureTable { head: heads(&["made by", "picture"]), ..FigureTable::default() };
     table.head.extend(heads(&LIKENESS));
     for Entry { label, stem, photos } in entries {
         let mut cells = Vec::new();

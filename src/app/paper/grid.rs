@@ -20,7 +20,7 @@ const SHEET_CELL_PX: u32 = 256;
 pub(super) fn fig3(bench: &Workbench<'_>) -> Result<Page> {
     let sizes = [Preset::paper(1), Preset::paper(3)];
     let mut rows = Vec::new();
-    let mut figures = FigureTable { head: heads(&["picture", "size", "flies"]), rows: Vec::new() };
+    let mut figures = FigureTable { head: heads(&["picture", "size", "flies"]), ..FigureTable::default() };
     figures.head.extend(heads(&LIKENESS));
     for preset in sizes {
         let mut cells = Vec::new();
@@ -117,7 +117,7 @@ fn describe(preset: Preset) -> String {
 
 /// Per scheme and picture the likeness, and that of the plainest mosaic with as many tiles.
 fn fig4_figures(bench: &Workbench<'_>, presets: &[Preset], evolved: &[Evolved]) -> Result<FigureTable> {
-    let mut table = FigureTable { head: heads(&["scheme", "picture"]), rows: Vec::new() };
+    let mut table = FigureTable { head: heads(&["scheme", "picture"]), ..FigureTable::default() };
     table.head.extend(heads(&LIKENESS));
     table.head.extend(heads(&["SAE to the full-colour picture", "births", "Clark-Evans index"]));
     for (k, evolved) in evolved.iter().enumerate() {

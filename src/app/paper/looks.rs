@@ -109,7 +109,7 @@ pub(super) fn fig8(bench: &Workbench<'_>) -> Result<Page> {
     })?;
     let evolved = bench.study.evolve(&recipes)?;
     let mut rows = Vec::new();
-    let mut table = FigureTable { head: heads(&["look", "picture"]), rows: Vec::new() };
+    let mut table = FigureTable { head: heads(&["look", "picture"]), ..FigureTable::default() };
     table.head.extend(heads(&LIKENESS));
     for (number, look) in looks.iter().enumerate() {
         let mut cells = Vec::new();

@@ -74,6 +74,8 @@ pub(super) enum Cell {
 pub(super) struct FigureTable {
     pub head: Vec<String>,
     pub rows: Vec<Vec<String>>,
+    /// The same as CSV, relative to the page, once it is written.
+    pub file: Option<String>,
 }
 
 impl FigureTable {
@@ -169,6 +171,7 @@ fn figures(table: &FigureTable) -> Markup {
             tr { @for head in &table.head { th { (head) } } }
             @for row in &table.rows { tr { @for value in row { td { (value) } } } }
         } }
+        @if let Some(file) = &table.file { p { a href=(file) { (file) } } }
     }
 }
 
@@ -186,7 +189,7 @@ mod tests {
         assert!(
             !html.contains("<script>") && !html.contains("<b>") && !html.contains("<i>") && !html.contains("<row>")
         );
-        let table = FigureTable { head: vec!["a".to_owned()], rows: vec![vec!["1,\"2".to_owned()]] };
+        let table = FigureTable { head: vec!["a".to_owned()], rows: vec![vec!["1,\"2".to_owned()]], file: None };
         assert_eq!(table.to_csv(), b"a\n\"1,\"\"2\"\n");
     }
 }

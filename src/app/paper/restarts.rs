@@ -40,7 +40,7 @@ pub(super) fn fig5(bench: &Workbench<'_>) -> Result<Page> {
         "Each run starts from the best population so far. The paper restarts with the same mutation steps; --cool shrinks them, \
          and the error of a run levels off with its step size.",
     );
-    let mut table = FigureTable { head: heads(&["picture", "restarts", "after run"]), rows: Vec::new() };
+    let mut table = FigureTable { head: heads(&["picture", "restarts", "after run"]), ..FigureTable::default() };
     table.head.extend(heads(&LIKENESS));
     table.head.extend(heads(&["births", "Clark-Evans index"]));
     for (number, picture) in bench.pictures.iter().enumerate() {
@@ -98,5 +98,5 @@ fn curve_table(evolved: &[&Evolved]) -> FigureTable {
             [vec![(*stem).to_owned()], figures.map(|figure| figure.to_string()).to_vec()].concat()
         })
     });
-    FigureTable { head: heads(&["restarts", "run", "births", "sae", "best_sae"]), rows: rows.collect() }
+    FigureTable { head: heads(&["restarts", "run", "births", "sae", "best_sae"]), rows: rows.collect(), file: None }
 }

@@ -24,6 +24,7 @@ pub(super) fn table1(bench: &Workbench<'_>) -> Result<Page> {
     let table = FigureTable {
         head: heads(&["scheme", "picture", "colours", "first run", "second run"]),
         rows: Preset::all().map(row).collect(),
+        ..FigureTable::default()
     };
     let mut page = Page::new(
         "Table 1: the schemes",
@@ -57,6 +58,7 @@ pub(super) fn table2(bench: &Workbench<'_>) -> Result<Page> {
     let table = FigureTable {
         head: heads(&["picture", "flies N", "unknowns 9N", "generations of a run", "mutation", "crossover"]),
         rows: [256, 512].map(row).to_vec(),
+        ..FigureTable::default()
     };
     let mut page = Page::new(
         "Table 2: the parameters",

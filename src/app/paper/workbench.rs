@@ -81,7 +81,7 @@ impl Workbench<'_> {
     /// Writes a table as CSV and returns it for the page.
     pub(super) fn write_table(&self, name: &str, table: FigureTable) -> Result<FigureTable> {
         self.folder.write(name, &table.to_csv())?;
-        Ok(table)
+        Ok(FigureTable { file: Some(name.to_owned()), ..table })
     }
 }
 
