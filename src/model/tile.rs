@@ -162,15 +162,42 @@ impl Tile {
         (u as u32, v as u32)
     }
 
-    /// The mask texel (column, row) at tile coordinates `(u, v)` of a covered pixel.
-    ///
-    /// `floor(u * 256 / (w * 4096))`, exactly, in 32 bits.
+    /// From tile coordinates of covered pixels to texels of the mask.
     #[inline]
+    #[must_use]
+    pub fn texel_map(&self) -> TexelMap {
+        TexelMap { w: self.w, h: self.h, w_inverse: u32::MAX / self.w, h_inverse: u32::MAX / self.h }
+    }
+}
+
+/// The way from tile coordinates to mask texels, without a division per pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct TexelMap {
+    w: u32,
+    h: u32,
+    w_inverse: u32,
+    h_inverse: u32,
+}
+
+impl TexelMap {
+    /// The texel (column, row) at tile coordinates `(u, v)` of a covered pixel: `floor(u * 256 / (w * 4096))`, exactly,
+    /// in 32 bits. Elsewhere both are any numbers.
+    #[inline(always)]
     #[must_use]
     pub fn texel(&self, u: u32, v: u32) -> (u32, u32) {
         const STEPS_PER_TEXEL: u32 = TRIG_ONE as u32 / MASK_SIDE as u32;
-        ((u / STEPS_PER_TEXEL) / self.w, (v / STEPS_PER_TEXEL) / self.h)
+        (quotient(u / STEPS_PER_TEXEL, self.w, self.w_inverse), quotient(v / STEPS_PER_TEXEL, self.h, self.h_inverse))
     }
+}
+
+/// `value / divisor` for `value < divisor << 8` and a divisor of at most 2^18, given `inverse = u32::MAX / divisor`.
+///
+/// The inverse falls short of 2^32 / divisor by at most 1, and so the product of the exact quotient by at most
+/// value / 2^32 < 1: its floor is the quotient or one less.
+#[inline(always)]
+fn quotient(value: u32, divisor: u32, inverse: u32) -> u32 {
+    let estimate = (u64::from(value) * u64::from(inverse) >> 32) as u32;
+    estimate.wrapping_add(u32::from(value.wrapping_sub(estimate.wrapping_mul(divisor)) >= divisor))
 }
 
 impl Fly {
@@ -230,6 +257,18 @@ mod tests {
         let inside = |(i, j): &(i32, i32)| (tile.x0..=tile.x1).contains(i) && (tile.y0..=tile.y1).contains(j);
         let pixels = (0..canvas.height_px as i32).flat_map(|j| (0..canvas.width_px as i32).map(move |i| (i, j)));
         pixels.filter(inside).filter(|&(i, j)| covered(&tile, i, j)).count()
+    }
+
+    #[test]
+    fn texels_without_a_division_are_those_of_the_division() {
+        for divisor in 1..=SIDE_MAX {
+            let inverse = u32::MAX / divisor;
+            for texel in 0..256 {
+                let (first, last) = (texel * divisor, texel * divisor + divisor - 1);
+                assert_eq!(quotient(first, divisor, inverse), texel, "{first} / {divisor}");
+                assert_eq!(quotient(last, divisor, inverse), texel, "{last} / {divisor}");
+            }
+        }
     }
 
     #[test]

@@ -5,13 +5,17 @@ use std::sync::Arc;
 use smalti::cpu::CpuEvaluator;
 use smalti::gpu::{GpuEvaluator, KernelShape};
 use smalti::model::fly::SIDE_MAX;
-use smalti::model::{Canvas, Change, Evaluator, Fly, NO_FLY, Population, Scene, Target};
+use smalti::model::mask::Texel;
+use smalti::model::{Blend, Canvas, Change, Evaluator, Fly, Mask, MaskSet, NO_FLY, Population, Scene, Target};
 
 use smalti::vk::{DeviceOptions, Staging};
 
 use crate::canary;
 use crate::reference::Reference;
-use crate::scenarios::{Scenario, any_fly, holed_masks, random_scene, scenarios, stream};
+use crate::scenarios::{
+    Scenario, any_fly, deep_stacks, holed_masks, random_scene, scenarios, stream, translucent_masks,
+    translucent_scenarios,
+};
 
 /// Flies whose marginal fitness is also checked by leaving them out of a whole picture.
 const RE_RENDERS: usize = 500;
@@ -44,6 +48,13 @@ fn population(scene: &Scene, flies: &[Fly]) -> Population {
         background: scene.background,
         masks: (*scene.masks).clone(),
         flies: flies.to_vec(),
+    }
+}
+
+#[test]
+fn on_the_cpu_translucent_fitness_layers_and_mosaic_equal_brute_force() {
+    for scenario in translucent_scenarios().into_iter().chain(deep_stacks()) {
+        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &scenario);
     }
 }
 
@@ -115,9 +126,18 @@ fn incremental_scene() -> Scene {
     Scene { masks: Arc::new(holed_masks()), ..random_scene(120, 90, 400, &mut stream(3)) }
 }
 
+fn incremental_translucent_scene() -> Scene {
+    Scene { masks: Arc::new(translucent_masks(&mut stream(4))), ..incremental_scene() }
+}
+
 #[test]
 fn on_the_cpu_the_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
     check_incremental(&mut CpuEvaluator::new(vec![incremental_scene()]));
+}
+
+#[test]
+fn on_the_cpu_the_translucent_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
+    check_incremental(&mut CpuEvaluator::new(vec![incremental_translucent_scene()]));
 }
 
 #[test]
@@ -127,11 +147,12 @@ fn on_vulkan_the_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
     });
 }
 
-/// Loads and changes three lanes together, and each alone; all fitness must agree.
+/// Loads and changes four lanes together, and each alone; all fitness must agree.
 fn check_lanes(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
     let mut random = stream(11);
     let masked = Scene { masks: Arc::new(holed_masks()), ..random_scene(70, 20, 90, &mut random) };
-    let scenes = vec![random_scene(33, 65, 120, &mut random), masked, random_scene(8, 8, 7, &mut random)];
+    let foggy = Scene { masks: Arc::new(translucent_masks(&mut random)), ..random_scene(40, 41, 100, &mut random) };
+    let scenes = vec![random_scene(33, 65, 120, &mut random), foggy, masked, random_scene(8, 8, 7, &mut random)];
     let populations: Vec<Vec<Fly>> = scenes
         .iter()
         .map(|scene| (0..scene.fly_count).map(|_| any_fly(scene, 1.0..20.0, &mut random)).collect())
@@ -140,7 +161,7 @@ fn check_lanes(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
         let index = scenes[lane].fly_count as u32 / 2;
         Change { lane, index, fly: any_fly(&scenes[lane], 1.0..20.0, random) }
     };
-    let changes: Vec<Change> = (0..3).map(|lane| change(lane, &mut random)).collect();
+    let changes: Vec<Change> = (0..scenes.len()).map(|lane| change(lane, &mut random)).collect();
 
     let mut together = create(scenes.clone());
     let loads: Vec<(usize, &[Fly])> = populations.iter().map(Vec::as_slice).enumerate().collect();
@@ -157,15 +178,43 @@ fn check_lanes(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
 }
 
 #[test]
-fn on_the_cpu_three_lanes_of_different_sizes_equal_three_single_ones() {
+fn on_the_cpu_lanes_of_different_sizes_and_blends_equal_single_ones() {
     check_lanes(|scenes| Box::new(CpuEvaluator::new(scenes)));
 }
 
 #[test]
-fn on_vulkan_three_lanes_of_different_sizes_equal_three_single_ones() {
+fn on_vulkan_lanes_of_different_sizes_and_blends_equal_single_ones() {
     canary::with_device(&DeviceOptions::default(), |device| {
         check_lanes(|scenes| Box::new(GpuEvaluator::create(&device, scenes).expect("it fits")));
     });
+}
+
+/// With coverage of nothing or all, translucent tiles are opaque ones.
+fn check_opaque_equivalence(mut create: impl FnMut(Scene) -> Box<dyn Evaluator>) {
+    let mut random = stream(12);
+    let texel = |texel: &Texel| Texel { coverage: if texel.coverage < 128 { 0 } else { 255 }, ..*texel };
+    let holed = holed_masks();
+    let layers = holed.layers()[1..].iter().map(|mask| Mask::new(mask.texels().iter().map(texel).collect()));
+    let masks = MaskSet::with_layers(layers.collect::<Result<_, _>>().expect("full layers")).expect("few layers");
+    let scene = Scene { background: [1, 99, 200], ..random_scene(75, 50, 220, &mut random) };
+    let flies: Vec<Fly> = (0..scene.fly_count)
+        .map(|index| Fly { mask: index as u16 % 3, ..any_fly(&scene, 1.0..20.0, &mut random) })
+        .collect();
+    let mut evaluate = |blend: Blend| {
+        let scene = Scene { masks: Arc::new(masks.clone().with_blend(blend)), ..scene.clone() };
+        let mut evaluator = create(scene.clone());
+        evaluator.load(&[(0, &flies)]).expect("the evaluator works");
+        let evaluation = (evaluator.evaluation(0).sae, evaluator.evaluation(0).marginal.to_vec());
+        let layers = evaluator.read_back_layers(0).expect("the evaluator works");
+        let canvas = Canvas::scaled(75, 50, 120);
+        (evaluation, layers, evaluator.draw(&population(&scene, &flies), &canvas, 2).expect("the evaluator works"))
+    };
+    assert_eq!(evaluate(Blend::Opaque), evaluate(Blend::Translucent));
+}
+
+#[test]
+fn on_the_cpu_translucent_tiles_of_all_or_nothing_equal_opaque_ones() {
+    check_opaque_equivalence(|scene| Box::new(CpuEvaluator::new(vec![scene])));
 }
 
 #[test]
