@@ -6,7 +6,7 @@
 use multiversion::multiversion;
 
 use super::lane_evaluation::{Block, BlockView, PIXELS, SIDE, TargetBlock, error, inside};
-use super::rows::{TileRows, TileTexels};
+use super::rows::{TileRows, texels};
 use crate::model::blocks::index_of;
 use crate::model::mask::{COVERAGE_THRESHOLD, Mask, shaded};
 use crate::model::tile::{Tile, pack};
@@ -38,9 +38,8 @@ pub(super) fn refresh(view: &BlockView<'_>, block: &mut Block, palette: &mut Pal
     palette.parts.resize(palette.colors.len(), 0);
     let plain = |key: u32, palette: &Palette| palette.colors[key as usize];
     let under_shade = |key: u32, palette: &Palette| shaded(palette.colors[(key >> 8) as usize], key & 255);
-    block.parts.error =
-        if has_masks { add_up(view, &scan, palette, under_shade) } else { add_up(view, &scan, palette, plain) };
-    block.set_parts(view.list, &palette.parts);
+    let error = if has_masks { add_up(view, &scan, palette, under_shade) } else { add_up(view, &scan, palette, plain) };
+    block.parts.set(view.flies(), &palette.parts, error);
     block.top = scan.top.map(|key| view.fly(scan.slot(key)));
     block.under = scan.under.map(|key| view.fly(scan.slot(key)));
 }
@@ -48,8 +47,11 @@ pub(super) fn refresh(view: &BlockView<'_>, block: &mut Block, palette: &mut Pal
 /// Adds up the errors of a block, and per slot the parts of marginal fitness.
 #[inline(always)]
 fn add_up(view: &BlockView<'_>, scan: &Scan, palette: &mut Palette, color: impl Fn(u32, &Palette) -> u32) -> u32 {
-    let colors = |layer: &[u32; PIXELS]| layer.map(|key| color(key, palette));
-    let (tops, unders) = (colors(&scan.top), colors(&scan.under));
+    let (mut tops, mut unders) = ([0; PIXELS], [0; PIXELS]);
+    for pixel in 0..PIXELS {
+        tops[pixel] = color(scan.top[pixel], palette);
+        unders[pixel] = color(scan.under[pixel], palette);
+    }
     let mut sum = 0;
     for (pixel, &wanted) in view.target.iter().enumerate() {
         let (e1, e2) = (error(wanted, tops[pixel]), error(wanted, unders[pixel]));
@@ -131,12 +133,12 @@ impl Scan {
     /// Adds a tile with a mask.
     #[inline(always)]
     fn add_masked(&mut self, tile: &Tile, mask: &Mask, slot: u32) {
-        let (none, texels) = (self.background, TileTexels::new(tile, mask));
+        let none = self.background;
         let mut rows = TileRows::new(tile, self.origin);
         for row in rows.rows.clone() {
             let (u, v) = rows.coordinates();
             if rows.any_covered(&u, &v) {
-                let texels = texels.row(&u, &v);
+                let texels = texels(tile, mask, &u, &v);
                 let (top, under) = self.row(row);
                 for i in 0..SIDE {
                     let is_solid = rows.is_covered(u[i], v[i]) & (texels[i] & 255 >= u32::from(COVERAGE_THRESHOLD));

@@ -38,15 +38,6 @@ impl Default for Block {
     }
 }
 
-impl Block {
-    /// Sets the parts of marginal fitness, given one for each tile of the block's list.
-    pub(super) fn set_parts(&mut self, list: &[u64], parts: &[i32]) {
-        self.parts.marginal.clear();
-        let flies = list.iter().map(|&key| index_of(key));
-        self.parts.marginal.extend(flies.zip(parts.iter().copied()).filter(|&(_, part)| part != 0));
-    }
-}
-
 /// Buffers that a thread uses again for each block.
 #[derive(Default)]
 struct Buffers {
@@ -174,6 +165,11 @@ impl<'a> BlockView<'a> {
     fn new(lane: &'a Lane, number: usize, target: &'a TargetBlock) -> Self {
         let (x, y) = lane.lists().origin(number);
         Self { lane, list: lane.lists().list(number), target, origin: (x as i32, y as i32) }
+    }
+
+    /// The flies of the list, nearest first.
+    pub(super) fn flies(&self) -> impl Iterator<Item = u32> {
+        self.list.iter().map(|&key| index_of(key))
     }
 
     /// The fly in a slot of the list; [`NO_FLY`] in the one after the last.

@@ -26,7 +26,7 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
         let drawn: Vec<(Patch, Vec<u32>)> = (first..first + lists.columns() as usize)
             .into_par_iter()
             .map(|number| {
-                let patch = patch_at(&lists, number, side, &samples);
+                let patch = lists.patch(number, &samples);
                 let colors = draw_patch(population, &tiles, lists.list(number), &patch);
                 (patch, colors)
             })
@@ -36,12 +36,6 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
         }
     }
     mosaic
-}
-
-/// The part of the canvas that block `number` covers.
-fn patch_at(lists: &BlockLists, number: usize, side: u32, canvas: &Canvas) -> Patch {
-    let (x, y) = lists.origin(number);
-    Patch { x, y, width_px: side.min(canvas.width_px - x), height_px: side.min(canvas.height_px - y) }
 }
 
 /// Packed colours of a patch, row by row.
@@ -81,13 +75,12 @@ const FULL: Texel = Texel { coverage: 255, shade: 255 };
 fn for_each_texel(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut(usize, Texel)) {
     let (left, top) = (patch.x as i32, patch.y as i32);
     let columns = tile.x0.max(left)..tile.x1.min(left + patch.width_px as i32 - 1) + 1;
-    let map = tile.texel_map();
     for j in tile.y0.max(top)..=tile.y1.min(top + patch.height_px as i32 - 1) {
         let row = (j - top) as usize * patch.width_px as usize;
         for i in columns.clone() {
             let (u, v) = tile.coordinates(i, j);
             if u < tile.u_end() && v < tile.v_end() {
-                let (column, texel_row) = map.texel(u, v);
+                let (column, texel_row) = tile.texel(u, v);
                 let texel = if tile.mask == 0 { FULL } else { mask.texel(column, texel_row) };
                 visit(row + (i - left) as usize, texel);
             }

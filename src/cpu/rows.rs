@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::lane_evaluation::SIDE;
 use crate::model::mask::{MASK_SIDE, Mask, TEXELS, Texel};
-use crate::model::tile::{TexelMap, Tile};
+use crate::model::tile::Tile;
 
 /// The part of a tile in one block, row by row.
 pub(super) struct TileRows {
@@ -24,24 +24,31 @@ impl TileRows {
     pub(super) fn new(tile: &Tile, (x, y): (i32, i32)) -> Self {
         let (first, last) = ((tile.y0 - y).max(0), (tile.y1 - y).min(SIDE as i32 - 1));
         let (u, v) = tile.coordinates(x, y + first);
+        let (mut u_steps, mut v_steps) = ([0; SIDE], [0; SIDE]);
+        for i in 0..SIDE {
+            u_steps[i] = tile.cos.wrapping_mul(i as i32) as u32;
+            v_steps[i] = tile.sin.wrapping_mul(i as i32) as u32;
+        }
         Self {
             rows: first as usize..=last as usize,
             ends: (tile.u_end(), tile.v_end()),
             u,
             v,
             steps: (tile.sin as u32, tile.cos as u32),
-            u_steps: std::array::from_fn(|i| tile.cos.wrapping_mul(i as i32) as u32),
-            v_steps: std::array::from_fn(|i| tile.sin.wrapping_mul(i as i32) as u32),
+            u_steps,
+            v_steps,
         }
     }
 
     /// Tile coordinates of the pixels of this row.
     #[inline(always)]
     pub(super) fn coordinates(&self) -> ([u32; SIDE], [u32; SIDE]) {
-        (
-            std::array::from_fn(|i| self.u.wrapping_add(self.u_steps[i])),
-            std::array::from_fn(|i| self.v.wrapping_sub(self.v_steps[i])),
-        )
+        let (mut u, mut v) = ([0; SIDE], [0; SIDE]);
+        for i in 0..SIDE {
+            u[i] = self.u.wrapping_add(self.u_steps[i]);
+            v[i] = self.v.wrapping_sub(self.v_steps[i]);
+        }
+        (u, v)
     }
 
     /// Whether the square covers a pixel.
@@ -64,29 +71,19 @@ impl TileRows {
     }
 }
 
-/// The texels of a tile's mask by tile coordinates.
-pub(super) struct TileTexels<'a> {
-    texels: &'a [Texel; TEXELS],
-    map: TexelMap,
-}
-
-impl<'a> TileTexels<'a> {
-    #[inline(always)]
-    pub(super) fn new(tile: &Tile, mask: &'a Mask) -> Self {
-        Self { texels: mask.texels(), map: tile.texel_map() }
+/// The texels of a row of a tile with a mask: coverage in the lowest byte, then shade. Any texel where the tile does not
+/// cover.
+#[inline(always)]
+pub(super) fn texels(tile: &Tile, mask: &Mask, u: &[u32; SIDE], v: &[u32; SIDE]) -> [u32; SIDE] {
+    let (mut places, mut texels) = ([0; SIDE], [0; SIDE]);
+    for i in 0..SIDE {
+        let (column, row) = tile.texel(u[i], v[i]);
+        // Within the array for any number, so that no check is left.
+        places[i] = (row % MASK_SIDE as u32) * MASK_SIDE as u32 + column % MASK_SIDE as u32;
     }
-
-    /// The texels of a row: coverage in the lowest byte, then shade. Any texel where the tile does not cover.
-    #[inline(always)]
-    pub(super) fn row(&self, u: &[u32; SIDE], v: &[u32; SIDE]) -> [u32; SIDE] {
-        let places: [u32; SIDE] = std::array::from_fn(|i| {
-            let (column, row) = self.map.texel(u[i], v[i]);
-            // Within the array for any number, so that no check is left.
-            (row % MASK_SIDE as u32) * MASK_SIDE as u32 + column % MASK_SIDE as u32
-        });
-        places.map(|place| {
-            let Texel { coverage, shade } = self.texels[place as usize];
-            u32::from(coverage) | u32::from(shade) << 8
-        })
+    for i in 0..SIDE {
+        let Texel { coverage, shade } = mask.texels()[places[i] as usize % TEXELS];
+        texels[i] = u32::from(coverage) | u32::from(shade) << 8;
     }
+    texels
 }

@@ -7,7 +7,7 @@
 use multiversion::multiversion;
 
 use super::lane_evaluation::{Block, BlockView, PIXELS, SIDE, error, inside};
-use super::rows::{TileRows, TileTexels};
+use super::rows::{TileRows, texels};
 use crate::model::blocks::index_of;
 use crate::model::mask::shaded;
 use crate::model::tile::{Tile, pack};
@@ -26,44 +26,53 @@ type Lanes = [u32; LANES];
 #[derive(Default)]
 pub(super) struct Stack {
     groups: [Group; GROUPS],
-    /// Parts of marginal fitness by list slot; the slot after the last tile takes those of no fly.
+    /// Parts of marginal fitness by list slot.
     parts: Vec<i32>,
 }
 
-/// The layers of a group of pixels, by rank: each pixel has its own nearest, second nearest, ... layer.
+/// The layers of a group of pixels, in rows: going down the rows, each pixel meets its layers from the nearest on. A
+/// tile lies in one row, the first below all layers of its pixels, so that it is added and summed up by vectors.
 #[derive(Default)]
 struct Group {
-    /// Colour under its shade, coverage in the highest byte; 0 past a pixel's last layer.
+    /// Colour under its shade, coverage in the highest byte; 0 where a pixel has no layer.
     layers: Vec<Lanes>,
     /// The list slots of these layers.
     slots: Vec<Lanes>,
-    counts: Lanes,
+    /// Row and slot of each tile.
+    tiles: Vec<(u32, u32)>,
+    /// What leaving out each layer changes in the error.
+    changes: Vec<Lanes>,
+    /// Row after each pixel's last layer.
+    ends: Lanes,
     transmittance: Lanes,
     /// See [`widest_after`].
     widest: Lanes,
+    /// Slot of each pixel's nearest layer and of the next one, or [`NO_SLOT`].
+    top: Lanes,
+    under: Lanes,
 }
+
+/// No slot of any list.
+const NO_SLOT: u32 = u32::MAX;
 
 /// Recomputes one block from its list.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
 pub(super) fn refresh(view: &BlockView<'_>, block: &mut Block, stack: &mut Stack) {
     block.closed_at = collect(view, stack);
     stack.parts.clear();
-    stack.parts.resize(view.list.len() + 1, 0);
-    block.parts.error = 0;
+    stack.parts.resize(view.list.len(), 0);
+    let mut error = 0;
     let background = pack(view.lane.scene().background);
     let targets = view.target.as_chunks().0;
-    for (number, (group, target)) in stack.groups.iter().zip(targets).enumerate() {
-        block.parts.error += leave_out_each(group, target, background, &mut stack.parts);
-        let fly = |rank: usize, pixel: usize| {
-            let slot = if (rank as u32) < group.counts[pixel] { group.slots[rank][pixel] } else { u32::MAX };
-            view.fly(slot)
-        };
+    for (number, (group, target)) in stack.groups.iter_mut().zip(targets).enumerate() {
+        error += leave_out_each(group, target, background);
+        group.add_up(&mut stack.parts);
         for pixel in 0..LANES {
-            block.top[number * LANES + pixel] = fly(0, pixel);
-            block.under[number * LANES + pixel] = fly(1, pixel);
+            block.top[number * LANES + pixel] = view.fly(group.top[pixel]);
+            block.under[number * LANES + pixel] = view.fly(group.under[pixel]);
         }
     }
-    block.set_parts(view.list, &stack.parts);
+    block.parts.set(view.flies(), &stack.parts, error);
 }
 
 /// Collects the layers of every pixel until none shows any more, and returns the depth key of the tile at which that
@@ -74,11 +83,11 @@ fn collect(view: &BlockView<'_>, stack: &mut Stack) -> u64 {
     stack.groups.iter_mut().zip(targets).for_each(|(group, target)| group.clear(target));
     for (slot, &key) in (0..).zip(view.list) {
         let tile = &view.lane.tiles()[index_of(key) as usize];
-        let mut words = [0; PIXELS];
-        let rows = draw(view, tile, &mut words);
-        if rows.is_empty() {
+        if !tile.may_cover(view.origin, SIDE as i32) {
             continue;
         }
+        let mut words = [0; PIXELS];
+        let rows = draw(view, tile, &mut words);
         let words = words.as_chunks().0;
         for number in rows.start() * SIDE / LANES..=rows.end() * SIDE / LANES {
             stack.groups[number].add(&words[number], slot);
@@ -96,19 +105,21 @@ fn collect(view: &BlockView<'_>, stack: &mut Stack) -> u64 {
 fn draw(view: &BlockView<'_>, tile: &Tile, words: &mut [u32; PIXELS]) -> std::ops::RangeInclusive<usize> {
     let mut rows = TileRows::new(tile, view.origin);
     let range = rows.rows.clone();
-    let texels = TileTexels::new(tile, &view.lane.scene().masks.layers()[tile.mask as usize]);
+    // A local, so that it is not loaded again for each pixel.
+    let color = tile.color;
+    let mask = &view.lane.scene().masks.layers()[tile.mask as usize];
     for row in range.clone() {
         let (u, v) = rows.coordinates();
         let words = &mut words[row * SIDE..(row + 1) * SIDE];
         if tile.mask == 0 {
             for i in 0..SIDE {
-                words[i] = if rows.is_covered(u[i], v[i]) { tile.color | 255 << 24 } else { 0 };
+                words[i] = if rows.is_covered(u[i], v[i]) { color | 255 << 24 } else { 0 };
             }
         } else if rows.any_covered(&u, &v) {
-            let texels = texels.row(&u, &v);
+            let texels = texels(tile, mask, &u, &v);
             for i in 0..SIDE {
                 let is_there = rows.is_covered(u[i], v[i]) & (texels[i] & 255 != 0);
-                words[i] = if is_there { shaded(tile.color, texels[i] >> 8) | texels[i] << 24 } else { 0 };
+                words[i] = if is_there { shaded(color, texels[i] >> 8) | texels[i] << 24 } else { 0 };
             }
         }
         rows.step();
@@ -121,10 +132,16 @@ impl Group {
     fn clear(&mut self, target: &Lanes) {
         self.layers.clear();
         self.slots.clear();
-        self.counts = [0; LANES];
-        // The overhang of a block at the edge counts nothing: nothing shows there.
-        self.transmittance = target.map(|wanted| CLEAR & inside(wanted));
+        self.tiles.clear();
+        self.changes.clear();
+        self.ends = [0; LANES];
         self.widest = [0; LANES];
+        self.top = [NO_SLOT; LANES];
+        self.under = [NO_SLOT; LANES];
+        for i in 0..LANES {
+            // The overhang of a block at the edge counts nothing: nothing shows there.
+            self.transmittance[i] = CLEAR & inside(target[i]);
+        }
     }
 
     /// Whether no deeper layer shows.
@@ -133,31 +150,50 @@ impl Group {
         (0..LANES).fold(0, |open, i| open | self.transmittance[i] | self.widest[i]) == 0
     }
 
-    /// Adds a layer to the pixels that it covers.
+    /// Adds a layer to the pixels that it covers and in which it may show.
     #[inline(always)]
     fn add(&mut self, words: &Lanes, slot: u32) {
-        let shows = |i: usize| if self.transmittance[i] | self.widest[i] != 0 { words[i] } else { 0 };
-        let words: Lanes = std::array::from_fn(shows);
-        if words.iter().fold(0, |any, word| any | word) == 0 {
+        let (mut layer, mut any, mut row) = ([0; LANES], 0, 0);
+        for i in 0..LANES {
+            layer[i] = if self.transmittance[i] | self.widest[i] != 0 { words[i] } else { 0 };
+            any |= layer[i];
+            row = row.max(if layer[i] != 0 { self.ends[i] } else { 0 });
+        }
+        if any == 0 {
             return;
         }
-        let deepest = self.counts.iter().fold(0, |deepest, &count| deepest.max(count)) as usize;
-        if deepest == self.layers.len() {
+        if row as usize == self.layers.len() {
             self.layers.push([0; LANES]);
-            self.slots.push([0; LANES]);
+            self.slots.push([NO_SLOT; LANES]);
         }
+        self.tiles.push((row, slot));
+        let (layers, slots) = (&mut self.layers[row as usize], &mut self.slots[row as usize]);
         for i in 0..LANES {
-            let opacity = opacity(words[i] >> 24);
+            let covers = layer[i] != 0;
+            let opacity = opacity(layer[i] >> 24);
             let widest = widest_after(self.widest[i], self.transmittance[i], opacity);
-            self.widest[i] = if words[i] != 0 { widest } else { self.widest[i] };
+            self.widest[i] = if covers { widest } else { self.widest[i] };
             self.transmittance[i] = kept(self.transmittance[i], opacity);
+            layers[i] = if covers { layer[i] } else { layers[i] };
+            slots[i] = if covers { slot } else { slots[i] };
+            self.ends[i] = if covers { row + 1 } else { self.ends[i] };
+            // Slots rise with depth: the smallest two are the nearest.
+            let candidate = if covers { slot } else { NO_SLOT };
+            self.under[i] = self.under[i].min(self.top[i].max(candidate));
+            self.top[i] = self.top[i].min(candidate);
         }
-        for i in 0..LANES {
-            // Past the last layer stays 0, and the slot there is never asked for.
-            let rank = self.counts[i] as usize;
-            self.layers[rank][i] = words[i];
-            self.slots[rank][i] = slot;
-            self.counts[i] += u32::from(words[i] != 0);
+    }
+
+    /// Adds the changes of each tile's pixels to the part of its slot.
+    #[inline(always)]
+    fn add_up(&self, parts: &mut [i32]) {
+        for &(row, slot) in &self.tiles {
+            let (slots, changes) = (&self.slots[row as usize], &self.changes[row as usize]);
+            let mut sum = 0_u32;
+            for i in 0..LANES {
+                sum = sum.wrapping_add(if slots[i] == slot { changes[i] } else { 0 });
+            }
+            parts[slot as usize] += sum as i32;
         }
     }
 }
@@ -189,19 +225,21 @@ impl State {
 
     /// The error of each pixel over the background; 0 in the overhang of a block at the edge.
     #[inline(always)]
-    fn errors(&self, target: &Lanes, background: u32) -> [i32; LANES] {
-        std::array::from_fn(|i| {
-            let over =
-                |sum: u32, shift: u32| channel(sum + self.transmittance[i] * (background >> shift & 255)) << shift;
+    fn errors(&self, target: &Lanes, background: u32) -> Lanes {
+        let mut errors = [0; LANES];
+        for i in 0..LANES {
+            let weight = self.transmittance[i];
+            let over = |sum: u32, shift: u32| channel(sum + weight * (background >> shift & 255)) << shift;
             let color = over(self.red[i], 0) | over(self.green[i], 8) | over(self.blue[i], 16);
-            error(target[i], color) & inside(target[i]) as i32
-        })
+            errors[i] = error(target[i], color) as u32 & inside(target[i]);
+        }
+        errors
     }
 }
 
-/// Adds what each layer of the group changes in the error to the parts of its slot, and returns the error.
+/// Sets what leaving out each layer of the group changes in the error, and returns the error.
 #[inline(always)]
-fn leave_out_each(group: &Group, target: &Lanes, background: u32, parts: &mut [i32]) -> u32 {
+fn leave_out_each(group: &mut Group, target: &Lanes, background: u32) -> u32 {
     let mut whole = State::START;
     group.layers.iter().for_each(|layer| whole.add(layer));
     let errors = whole.errors(target, background);
@@ -221,12 +259,13 @@ fn leave_out_each(group: &Group, target: &Lanes, background: u32, parts: &mut [i
         for layer in behind {
             without.iter_mut().for_each(|state| state.add(layer));
         }
-        for (slots, state) in group.slots[first..].iter().zip(&without) {
-            let errors_without = state.errors(target, background);
+        for state in &without[..chunk.len()] {
+            let mut changes = state.errors(target, background);
             for i in 0..LANES {
-                parts[slots[i] as usize] += errors_without[i] - errors[i];
+                changes[i] = changes[i].wrapping_sub(errors[i]);
             }
+            group.changes.push(changes);
         }
     }
-    errors.iter().sum::<i32>() as u32
+    errors.iter().sum()
 }

@@ -17,7 +17,7 @@ pub enum Blend {
     /// The tile is there from [`COVERAGE_THRESHOLD`] on, and hides what lies behind it.
     #[default]
     Opaque,
-    /// Coverage is the tile's opacity: 0 shows what lies behind, 255 hides it.
+    /// Coverage is the tile's opacity: 0 shows what lies behind, 255 hides it ([`super::translucency`]).
     Translucent,
 }
 

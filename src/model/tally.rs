@@ -11,6 +11,15 @@ pub struct BlockParts {
     pub error: u32,
 }
 
+impl BlockParts {
+    /// Replaces what was there by `error` and a part of marginal fitness for each fly.
+    pub fn set(&mut self, flies: impl Iterator<Item = u32>, marginal: &[i32], error: u32) {
+        self.error = error;
+        self.marginal.clear();
+        self.marginal.extend(flies.zip(marginal.iter().copied()).filter(|&(_, part)| part != 0));
+    }
+}
+
 /// The fitness of a lane, summed up from its blocks.
 #[derive(Clone, Debug)]
 pub struct Tally {

@@ -40,6 +40,10 @@ pub struct Tile {
     pub color: u32,
     /// Layer of the mask set; 0 is the full square and is never looked up.
     pub mask: u32,
+    /// [`inverse`] of the width: texels are found without a division per pixel.
+    pub w_inverse: u32,
+    /// [`inverse`] of the height.
+    pub h_inverse: u32,
 }
 
 /// What a population is drawn on: its size, and how many canvas pixels one picture pixel spans.
@@ -82,8 +86,22 @@ impl Canvas {
 
 impl Tile {
     /// A tile that covers nothing.
-    pub const EMPTY: Self =
-        Self { x0: 1, y0: 1, x1: 0, y1: 0, u0: 0, v0: 0, cos: 0, sin: 0, w: 0, h: 0, color: 0, mask: 0 };
+    pub const EMPTY: Self = Self {
+        x0: 1,
+        y0: 1,
+        x1: 0,
+        y1: 0,
+        u0: 0,
+        v0: 0,
+        cos: 0,
+        sin: 0,
+        w: 0,
+        h: 0,
+        color: 0,
+        mask: 0,
+        w_inverse: 0,
+        h_inverse: 0,
+    };
 
     /// The tile of `fly` on `canvas`; [`Tile::EMPTY`] if the fly is absent or its tile misses the canvas.
     ///
@@ -127,6 +145,8 @@ impl Tile {
             h: h as u32,
             color: pack(fly.color()),
             mask: u32::from(fly.mask),
+            w_inverse: inverse(w as u32),
+            h_inverse: inverse(h as u32),
         }
     }
 
@@ -162,26 +182,23 @@ impl Tile {
         (u as u32, v as u32)
     }
 
-    /// From tile coordinates of covered pixels to texels of the mask.
-    #[inline]
+    /// Whether the tile may cover a pixel of a block of `side` x `side` px, at most a few dozen, that touches its box and
+    /// whose upper left pixel is `(x, y)`. Turned tiles fill half of their boxes, so many a block is spared.
+    #[inline(always)]
     #[must_use]
-    pub fn texel_map(&self) -> TexelMap {
-        TexelMap { w: self.w, h: self.h, w_inverse: u32::MAX / self.w, h_inverse: u32::MAX / self.h }
+    pub fn may_cover(&self, (x, y): (i32, i32), side: i32) -> bool {
+        let (u, v) = self.coordinates(x, y);
+        let overlaps = |first: u32, step: i32, other_step: i32, end: u32| {
+            let (first, reach) = (i64::from(first as i32), i64::from(side - 1));
+            let low = first + reach * i64::from(step.min(0) + other_step.min(0));
+            let high = first + reach * i64::from(step.max(0) + other_step.max(0));
+            (high >= 0) & (low < i64::from(end))
+        };
+        overlaps(u, self.cos, self.sin, self.u_end()) & overlaps(v, -self.sin, self.cos, self.v_end())
     }
-}
 
-/// The way from tile coordinates to mask texels, without a division per pixel.
-#[derive(Clone, Copy, Debug)]
-pub struct TexelMap {
-    w: u32,
-    h: u32,
-    w_inverse: u32,
-    h_inverse: u32,
-}
-
-impl TexelMap {
-    /// The texel (column, row) at tile coordinates `(u, v)` of a covered pixel: `floor(u * 256 / (w * 4096))`, exactly,
-    /// in 32 bits. Elsewhere both are any numbers.
+    /// The mask texel (column, row) at tile coordinates `(u, v)` of a covered pixel: `floor(u * 256 / (w * 4096))`,
+    /// exactly, in 32 bits. Elsewhere both are any numbers.
     #[inline(always)]
     #[must_use]
     pub fn texel(&self, u: u32, v: u32) -> (u32, u32) {
@@ -190,14 +207,24 @@ impl TexelMap {
     }
 }
 
-/// `value / divisor` for `value < divisor << 8` and a divisor of at most 2^18, given `inverse = u32::MAX / divisor`.
+/// What [`quotient`] multiplies by instead of dividing by `divisor`, 1 to 2^18: `2^(23 + shift) / divisor` in 24 bits,
+/// above it the shift that leaves 16 bits of any `value < divisor << 8`.
+#[must_use]
+pub fn inverse(divisor: u32) -> u32 {
+    let shift = (24 - divisor.leading_zeros().min(24)) as u64;
+    (shift << 24 | ((1 << (23 + shift)) - 1) / u64::from(divisor)) as u32
+}
+
+/// `value / divisor` for `value < divisor << 8`, given the divisor's [`inverse`]; any number for other values.
 ///
-/// The inverse falls short of 2^32 / divisor by at most 1, and so the product of the exact quotient by at most
-/// value / 2^32 < 1: its floor is the quotient or one less.
+/// Of the quotient, below 2^8, the shift loses less than 2^-7, and so does the inverse with its 15 bits at least: the
+/// estimate is the quotient or one less. All products fit 32 bits.
 #[inline(always)]
 fn quotient(value: u32, divisor: u32, inverse: u32) -> u32 {
-    let estimate = (u64::from(value) * u64::from(inverse) >> 32) as u32;
-    estimate.wrapping_add(u32::from(value.wrapping_sub(estimate.wrapping_mul(divisor)) >= divisor))
+    let estimate = (value >> (inverse >> 24)).wrapping_mul(inverse & 0xFF_FFFF) >> 23;
+    // 0 if the estimate is one less, else -1: without a comparison, which would not stay in a vector.
+    let is_enough = value.wrapping_sub(estimate.wrapping_mul(divisor)).wrapping_sub(divisor) as i32 >> 31;
+    estimate.wrapping_add(1).wrapping_add(is_enough as u32)
 }
 
 impl Fly {
@@ -262,7 +289,7 @@ mod tests {
     #[test]
     fn texels_without_a_division_are_those_of_the_division() {
         for divisor in 1..=SIDE_MAX {
-            let inverse = u32::MAX / divisor;
+            let inverse = inverse(divisor);
             for texel in 0..256 {
                 let (first, last) = (texel * divisor, texel * divisor + divisor - 1);
                 assert_eq!(quotient(first, divisor, inverse), texel, "{first} / {divisor}");

@@ -79,18 +79,54 @@ fn on_vulkan_fitness_layers_and_mosaic_equal_brute_force() {
 }
 
 #[test]
+fn on_vulkan_translucent_fitness_layers_and_mosaic_equal_brute_force() {
+    for scenario in translucent_scenarios().into_iter().chain(deep_stacks()) {
+        canary::with_device(&DeviceOptions::default(), |device| {
+            let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
+            check_scenario(&mut evaluator, &scenario);
+        });
+    }
+}
+
+#[test]
 fn every_kernel_shape_gives_the_same_numbers_directly_and_through_staging() {
     for (block_side_px, pixels_per_thread) in [(8, 1), (8, 4), (16, 4), (16, 8), (32, 4)] {
         let options = DeviceOptions { staging: Staging::Forced, ..DeviceOptions::default() };
         canary::with_device(&options, |device| {
             let shape = KernelShape { block_side_px, pixels_per_thread };
-            for scenario in scenarios().iter().filter(|scenario| scenario.flies.len() <= 300) {
+            let all = scenarios().into_iter().chain(translucent_scenarios());
+            for scenario in &all.filter(|scenario| scenario.flies.len() <= 300).collect::<Vec<_>>() {
                 let scenes = vec![scenario.scene.clone()];
                 let mut evaluator = GpuEvaluator::create_with_shape(&device, scenes, shape).expect("it fits");
                 check_scenario(&mut evaluator, scenario);
             }
         });
     }
+}
+
+#[test]
+fn translucent_tiles_are_drawn_alike_at_any_size_and_supersampling() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        for Scenario { name, scene, flies } in translucent_scenarios().into_iter().chain(deep_stacks()) {
+            let (width_px, height_px) = (scene.target.width_px(), scene.target.height_px());
+            if width_px.max(height_px) > 256 {
+                continue;
+            }
+            let population = population(&scene, &flies);
+            let mut cpu = CpuEvaluator::new(vec![scene.clone()]);
+            let mut vulkan = GpuEvaluator::create(&device, vec![scene]).expect("it fits");
+            // The last spans several patches of samples.
+            let sizes = [(17, 1), (150, 3), (1_100, 1)];
+            for (long_side_px, supersampling) in sizes.into_iter().take(if flies.len() > 1_000 { 1 } else { 3 }) {
+                let canvas = Canvas::scaled(width_px, height_px, long_side_px);
+                let draw = |evaluator: &mut dyn Evaluator| {
+                    evaluator.draw(&population, &canvas, supersampling).expect("the evaluator works")
+                };
+                let same = draw(&mut cpu) == draw(&mut vulkan);
+                assert!(same, "{name} at {long_side_px} px with {supersampling}² samples");
+            }
+        }
+    });
 }
 
 /// 10,000 births, in batches of 1 to 100, then the same population loaded afresh.
@@ -144,6 +180,13 @@ fn on_the_cpu_the_translucent_state_after_ten_thousand_births_equals_a_fresh_eva
 fn on_vulkan_the_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
     canary::with_device(&DeviceOptions::default(), |device| {
         check_incremental(&mut GpuEvaluator::create(&device, vec![incremental_scene()]).expect("it fits"));
+    });
+}
+
+#[test]
+fn on_vulkan_the_translucent_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_incremental(&mut GpuEvaluator::create(&device, vec![incremental_translucent_scene()]).expect("it fits"));
     });
 }
 
@@ -215,6 +258,13 @@ fn check_opaque_equivalence(mut create: impl FnMut(Scene) -> Box<dyn Evaluator>)
 #[test]
 fn on_the_cpu_translucent_tiles_of_all_or_nothing_equal_opaque_ones() {
     check_opaque_equivalence(|scene| Box::new(CpuEvaluator::new(vec![scene])));
+}
+
+#[test]
+fn on_vulkan_translucent_tiles_of_all_or_nothing_equal_opaque_ones() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_opaque_equivalence(|scene| Box::new(GpuEvaluator::create(&device, vec![scene]).expect("it fits")));
+    });
 }
 
 #[test]
