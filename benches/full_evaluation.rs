@@ -3,9 +3,6 @@
 mod common;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use smalti::cpu::CpuEvaluator;
-use smalti::gpu::GpuEvaluator;
-use smalti::model::Evaluator;
 
 fn full_evaluation(criterion: &mut Criterion) {
     let device = common::device();
@@ -13,11 +10,7 @@ fn full_evaluation(criterion: &mut Criterion) {
     group.sample_size(20);
     for (side_px, fly_count) in [(256, 2_500), (512, 5_000), (1024, 20_000)] {
         let (scene, flies) = common::scene(side_px, side_px, fly_count);
-        let evaluators: [(&str, Box<dyn Evaluator>); 2] = [
-            ("cpu", Box::new(CpuEvaluator::new(vec![scene.clone()]))),
-            ("vulkan", Box::new(GpuEvaluator::create(&device, vec![scene]).expect("it fits"))),
-        ];
-        for (name, mut evaluator) in evaluators {
+        for (name, mut evaluator) in common::evaluators(&device, &scene) {
             group.bench_function(BenchmarkId::new(name, format!("{side_px}px/{fly_count}")), |bencher| {
                 bencher.iter(|| evaluator.load(&[(0, &flies)]).expect("the evaluator works"));
             });

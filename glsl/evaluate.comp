@@ -5,13 +5,15 @@
 // under. Sums are kept by taking off what the block added last time and adding what it adds now.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
-#extension GL_EXT_samplerless_texture_functions : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 
+#define MASK_BINDING 10
 #include "shared/tile.glsl"
 #include "shared/error.glsl"
+#include "shared/lane.glsl"
+#include "shared/mask.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint BLOCK_SIDE = 8u;
@@ -23,13 +25,6 @@ layout(constant_id = 4) const uint MASKED = 1u;
 layout(constant_id = 5) const uint WIDE_SUMS = 1u;
 // 1: only the SAE of the top layer, with one fly left out: a plain re-render, the baseline of the benches.
 layout(constant_id = 3) const uint RE_RENDER = 0u;
-
-struct Lane {
-    uint first_fly;
-    uint first_mask;
-    uint background;
-    uint sum;
-};
 
 struct WorkItem {
     uint lane;
@@ -48,8 +43,6 @@ const uint FLAG_FRESH = 1u;
 const uint FLAG_CONTINUED = 2u;
 // A later dispatch looks at the rest of the list.
 const uint FLAG_UNFINISHED = 4u;
-// Highest byte of a target pixel inside the picture; 0 in the overhang of blocks at the edges.
-const uint INSIDE = 0xFF000000u;
 
 layout(std430, binding = 0) readonly buffer Lanes { Lane lanes[]; };
 layout(std430, binding = 1) readonly buffer Work { WorkItem items[]; };
@@ -63,7 +56,6 @@ layout(std430, binding = 7) buffer Parts { int parts[]; };
 // 64-bit sums as pairs of words, low word first, since 64-bit atomics are not everywhere.
 layout(std430, binding = 8) buffer Marginal { uint marginal[]; };
 layout(std430, binding = 9) buffer Sums { uint sums[]; };
-layout(binding = 10) uniform utexture2DArray masks;
 
 layout(push_constant) uniform Push {
     uint item_count;
@@ -94,20 +86,20 @@ void add_sum(uint sum, int part) {
     }
 }
 
-uvec2 mask_texel(Lane lane, Tile tile, uvec2 uv) {
-    return texelFetch(masks, ivec3(tile_texel(tile, uv), int(lane.first_mask + tile.mask)), 0).xy;
+// What is kept of the top and under of a pixel: the fly, and with masks in the lowest byte the shade of its texel. NO_FLY
+// stays what it is.
+const uint SHADE_BITS = MASKED * 8u;
+
+uint fly_of(uint shown) {
+    return shown == NO_FLY ? NO_FLY : shown >> SHADE_BITS;
 }
 
-// The colour that `fly` shows at pixel (i, j), which it covers, or the background.
-uint shown_color(Lane lane, uint fly, int i, int j) {
-    if (fly == NO_FLY) {
+uint shown_color(Lane lane, uint shown) {
+    if (shown == NO_FLY) {
         return lane.background;
     }
-    Tile tile = tiles[lane.first_fly + fly];
-    if (MASKED == 0u || tile.mask == 0u) {
-        return tile.color;
-    }
-    return shaded(tile.color, mask_texel(lane, tile, tile_coordinates(tile, i, j)).y);
+    uint color = tiles[lane.first_fly + (shown >> SHADE_BITS)].color;
+    return MASKED == 0u ? color : shaded(color, shown & 255u);
 }
 
 void main() {
@@ -142,10 +134,13 @@ void main() {
         bool open = false;
         [[unroll]] for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
             bool covered = uv.x < end.x && uv.y < end.y;
-            if (MASKED == 1u && covered && tile.mask != 0u) {
-                covered = mask_texel(lane, tile, uv).x >= COVERAGE_THRESHOLD;
+            uint shown = fly;
+            if (MASKED == 1u) {
+                uvec2 texel = tile.mask == 0u ? uvec2(255u) : mask_texel(lane.first_mask + tile.mask, tile, uv);
+                covered = covered && texel.x >= COVERAGE_THRESHOLD;
+                shown = fly << SHADE_BITS | texel.y;
             }
-            uint candidate = covered ? fly : NO_FLY;
+            uint candidate = covered ? shown : NO_FLY;
             if (RE_RENDER == 0u) {
                 under[p] = top[p] != NO_FLY && under[p] == NO_FLY ? candidate : under[p];
                 open = open || under[p] == NO_FLY;
@@ -169,7 +164,7 @@ void main() {
         uint target = targets[pixel];
         bool inside = (target & INSIDE) != 0u;
         if (RE_RENDER == 1u) {
-            int shown_error = color_error(target, shown_color(lane, top[p], i, j + int(p)));
+            int shown_error = color_error(target, shown_color(lane, top[p]));
             error_change += inside ? shown_error : 0;
             continue;
         }
@@ -180,15 +175,16 @@ void main() {
             }
             error_change -= old & 1023;
         }
-        top_layer[pixel] = top[p];
-        under_layer[pixel] = under[p];
+        // The next dispatch needs the shades, too.
+        top_layer[pixel] = unfinished ? top[p] : fly_of(top[p]);
+        under_layer[pixel] = unfinished ? under[p] : fly_of(under[p]);
         if (!unfinished) {
-            int top_error = color_error(target, shown_color(lane, top[p], i, j + int(p)));
-            int under_error = color_error(target, shown_color(lane, under[p], i, j + int(p)));
+            int top_error = color_error(target, shown_color(lane, top[p]));
+            int under_error = color_error(target, shown_color(lane, under[p]));
             int part = inside ? under_error - top_error : 0;
             top_error = inside ? top_error : 0;
             if (top[p] != NO_FLY) {
-                add_marginal(lane.first_fly + top[p], part);
+                add_marginal(lane.first_fly + fly_of(top[p]), part);
             }
             error_change += top_error;
             parts[pixel] = part << 10 | top_error;

@@ -28,7 +28,7 @@ void main() {
     }
     uint shown = tile.color;
     if (tile.mask != 0u) {
-        uvec2 texel = texelFetch(masks, ivec3(tile_texel(tile, uv), int(push.first_mask + tile.mask)), 0).xy;
+        uvec2 texel = texelFetch(masks, ivec3(tile_texel(tile, uv), push.first_mask + tile.mask), 0).xy;
         if (texel.x < COVERAGE_THRESHOLD) {
             discard;
         }

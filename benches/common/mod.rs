@@ -4,8 +4,11 @@
 
 use std::sync::Arc;
 
+use smalti::cpu::CpuEvaluator;
 use smalti::evolve::evolution::random_population;
-use smalti::model::{Fly, Scene, Target};
+use smalti::gpu::GpuEvaluator;
+use smalti::model::mask::{MASK_SIDE, Mask, Texel};
+use smalti::model::{Blend, Evaluator, Fly, MaskSet, Scene, Target};
 use smalti::vk::{Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, choose};
 
 /// A smooth picture with edges: bands of colour, a disc, and fine texture, all by integers.
@@ -25,6 +28,31 @@ pub fn target(width_px: u32, height_px: u32) -> Arc<Target> {
 pub fn scene(width_px: u32, height_px: u32, fly_count: usize) -> (Scene, Vec<Fly>) {
     let scene = Scene { target: target(width_px, height_px), masks: Arc::default(), background: [0; 3], fly_count };
     (scene, random_population(width_px, height_px, fly_count, 0))
+}
+
+/// The same flies with their sides scaled so that so many of them cover a pixel on average.
+pub fn at_depth(flies: &[Fly], scene: &Scene, depth: f64) -> Vec<Fly> {
+    let area: f64 = flies.iter().map(|fly| f64::from(fly.w) * f64::from(fly.h) / 4096.0).sum();
+    let factor = (depth * scene.target.pixels().len() as f64 / area).sqrt();
+    let side = |side: u32| (f64::from(side) * factor) as u32;
+    flies.iter().map(|fly| Fly { w: side(fly.w), h: side(fly.h), ..*fly }).collect()
+}
+
+/// The scene with the square and one more mask.
+pub fn with_mask(scene: &Scene, blend: Blend, texel: impl Fn(i32, i32) -> Texel) -> Scene {
+    let side = MASK_SIDE as i32;
+    let texels = (0..side).flat_map(|row| (0..side).map(move |column| (column, row)));
+    let mask = Mask::new(texels.map(|(column, row)| texel(column, row)).collect()).expect("a full layer");
+    let masks = MaskSet::with_layers(vec![mask]).expect("few layers").with_blend(blend);
+    Scene { masks: Arc::new(masks), ..scene.clone() }
+}
+
+/// Both evaluators of a scene, by name.
+pub fn evaluators(device: &Arc<Device>, scene: &Scene) -> [(&'static str, Box<dyn Evaluator>); 2] {
+    [
+        ("cpu", Box::new(CpuEvaluator::new(vec![scene.clone()]))),
+        ("vulkan", Box::new(GpuEvaluator::create(device, vec![scene.clone()]).expect("it fits"))),
+    ]
 }
 
 /// The Vulkan device that `SMALTI_DEVICE` asks for; software Vulkan unless it is set.

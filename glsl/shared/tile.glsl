@@ -13,6 +13,8 @@ struct Tile {
     uint h;
     uint color;
     uint mask;
+    uint w_inverse;
+    uint h_inverse;
 };
 
 const uint NO_FLY = 0xFFFFFFFFu;
@@ -33,14 +35,22 @@ bool is_inside(Tile tile, uvec2 uv) {
     return uv.x < tile.w << 12 && uv.y < tile.h << 12;
 }
 
+// value / divisor for values below divisor << 8. Twin: `quotient` in src/model/tile.rs, which explains why it is exact.
+uvec2 quotients(uvec2 value, uvec2 divisor, uvec2 inverse) {
+    uvec2 estimate = (value >> (inverse >> 24)) * (inverse & 0xFFFFFFu) >> 23;
+    ivec2 is_enough = ivec2(value - estimate * divisor - divisor) >> 31;
+    return estimate + 1u + uvec2(is_enough);
+}
+
 // floor(u * 256 / (w * 4096)), exactly, in 32 bits.
-ivec2 tile_texel(Tile tile, uvec2 uv) {
-    return ivec2(uv / STEPS_PER_TEXEL / uvec2(tile.w, tile.h));
+uvec2 tile_texel(Tile tile, uvec2 uv) {
+    return quotients(uv / STEPS_PER_TEXEL, uvec2(tile.w, tile.h), uvec2(tile.w_inverse, tile.h_inverse));
 }
 
 // A packed colour under a shade: each channel (c * shade + 127) / 255.
 uint shaded(uint color, uint shade) {
     uvec3 channels = (uvec3(color, color >> 8, color >> 16) & 255u) * shade + 127u;
-    channels /= 255u;
+    // Division by 255, exact below 2^16.
+    channels = channels * 32897u >> 23;
     return channels.x | channels.y << 8 | channels.z << 16;
 }

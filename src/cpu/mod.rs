@@ -5,12 +5,15 @@
 //! result. Twin: `gpu/` with `glsl/`.
 
 mod evaluate;
+mod lane_evaluation;
 mod mosaic;
+mod rows;
+mod translucent;
 
 use crate::error::Result;
 use crate::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
 
-use evaluate::LaneEvaluation;
+use lane_evaluation::LaneEvaluation;
 
 /// The evaluator that needs no device.
 #[derive(Debug)]

@@ -1,13 +1,14 @@
-//! Twin of `glsl/mosaic.vert` and `glsl/mosaic.frag`: draws a population at any size, painting from the farthest tile
-//! to the nearest by the exact coverage rule.
+//! Twin of `glsl/mosaic.vert` and `glsl/mosaic.frag`, and for translucent tiles of `glsl/compose.comp`: draws a
+//! population at any size by the exact coverage rule. Opaque tiles are painted from the farthest to the nearest;
+//! translucent ones are composited from the nearest to the farthest, as the fitness sees them.
 
 use rayon::prelude::*;
 
-use super::evaluate::tile_color;
 use crate::model::blocks::{BlockLists, index_of};
-use crate::model::mask::COVERAGE_THRESHOLD;
-use crate::model::tile::{Tile, pack};
-use crate::model::{Canvas, MaskSet, Mosaic, Patch, Population};
+use crate::model::mask::{COVERAGE_THRESHOLD, Texel, shaded};
+use crate::model::tile::{Tile, pack, unpack};
+use crate::model::translucency::{Compositing, opacity};
+use crate::model::{Blend, Canvas, Mask, Mosaic, Patch, Population};
 
 /// Samples along each side of a patch, before it is cut to whole pixels: 256 KiB of colours stay in a core's cache.
 const PATCH_SIDE: u32 = 256;
@@ -25,7 +26,7 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
         let drawn: Vec<(Patch, Vec<u32>)> = (first..first + lists.columns() as usize)
             .into_par_iter()
             .map(|number| {
-                let patch = patch_at(&lists, number, side, &samples);
+                let patch = lists.patch(number, &samples);
                 let colors = draw_patch(population, &tiles, lists.list(number), &patch);
                 (patch, colors)
             })
@@ -37,42 +38,52 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
     mosaic
 }
 
-/// The part of the canvas that block `number` covers.
-fn patch_at(lists: &BlockLists, number: usize, side: u32, canvas: &Canvas) -> Patch {
-    let (x, y) = lists.origin(number);
-    Patch { x, y, width_px: side.min(canvas.width_px - x), height_px: side.min(canvas.height_px - y) }
-}
-
 /// Packed colours of a patch, row by row.
 fn draw_patch(population: &Population, tiles: &[Tile], list: &[u64], patch: &Patch) -> Vec<u32> {
-    let mut colors = vec![pack(population.background); (patch.width_px * patch.height_px) as usize];
-    for &key in list.iter().rev() {
-        paint(&tiles[index_of(key) as usize], &population.masks, patch, &mut colors);
-    }
-    colors
-}
-
-/// Paints one tile over what is there.
-fn paint(tile: &Tile, masks: &MaskSet, patch: &Patch, colors: &mut [u32]) {
-    let (left, top) = (patch.x as i32, patch.y as i32);
-    let columns = tile.x0.max(left)..tile.x1.min(left + patch.width_px as i32 - 1) + 1;
-    for j in tile.y0.max(top)..=tile.y1.min(top + patch.height_px as i32 - 1) {
-        let row = &mut colors[(j - top) as usize * patch.width_px as usize..][..patch.width_px as usize];
-        for i in columns.clone() {
-            let (u, v) = tile.coordinates(i, j);
-            if u < tile.u_end() && v < tile.v_end() && is_solid(tile, masks, u, v) {
-                row[(i - left) as usize] = tile_color(tile, masks, i, j, tile.color);
+    let sample_count = (patch.width_px * patch.height_px) as usize;
+    let tiles = list.iter().map(|&key| &tiles[index_of(key) as usize]);
+    let tiles = tiles.map(|tile| (tile, &population.masks.layers()[tile.mask as usize]));
+    match population.masks.blend() {
+        Blend::Opaque => {
+            let mut colors = vec![pack(population.background); sample_count];
+            for (tile, mask) in tiles.rev() {
+                for_each_texel(tile, mask, patch, |sample, texel| {
+                    if texel.coverage >= COVERAGE_THRESHOLD {
+                        colors[sample] = shaded(tile.color, u32::from(texel.shade));
+                    }
+                });
             }
+            colors
+        }
+        Blend::Translucent => {
+            let mut samples = vec![Compositing::START; sample_count];
+            for (tile, mask) in tiles {
+                for_each_texel(tile, mask, patch, |sample, texel| {
+                    let color = shaded(tile.color, u32::from(texel.shade));
+                    samples[sample].add(opacity(u32::from(texel.coverage)), unpack(color));
+                });
+            }
+            samples.into_iter().map(|sample| pack(sample.over(population.background))).collect()
         }
     }
 }
 
-/// Whether the tile's mask has no hole at tile coordinates `(u, v)`.
-#[inline]
-fn is_solid(tile: &Tile, masks: &MaskSet, u: u32, v: u32) -> bool {
-    if tile.mask == 0 {
-        return true;
+/// The texel that a square has everywhere.
+const FULL: Texel = Texel { coverage: 255, shade: 255 };
+
+/// Calls `visit` with each sample of the patch inside the tile's square, counted row by row, and the texel there.
+fn for_each_texel(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut(usize, Texel)) {
+    let (left, top) = (patch.x as i32, patch.y as i32);
+    let columns = tile.x0.max(left)..tile.x1.min(left + patch.width_px as i32 - 1) + 1;
+    for j in tile.y0.max(top)..=tile.y1.min(top + patch.height_px as i32 - 1) {
+        let row = (j - top) as usize * patch.width_px as usize;
+        for i in columns.clone() {
+            let (u, v) = tile.coordinates(i, j);
+            if u < tile.u_end() && v < tile.v_end() {
+                let (column, texel_row) = tile.texel(u, v);
+                let texel = if tile.mask == 0 { FULL } else { mask.texel(column, texel_row) };
+                visit(row + (i - left) as usize, texel);
+            }
+        }
     }
-    let (column, row) = tile.texel(u, v);
-    masks.layers()[tile.mask as usize].texel(column, row).coverage >= COVERAGE_THRESHOLD
 }

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use super::layout::{EvaluatePush, LaneRecord, Tile, WorkItem};
 use super::shaders;
 use crate::error::{Error, Result};
-use crate::model::mask::MASK_SIDE;
+use crate::model::mask::{TEXELS, Texel};
 use crate::model::tile::pack;
 use crate::model::{Lane, MaskSet};
 use crate::vk::{
     Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePass, ComputePipeline, ComputeShader, Device,
-    DeviceKind, Image, ImageFormat, ImageShape, Recorder, Residence,
+    DeviceKind, Recorder, Residence,
 };
 
 /// Most tiles that one dispatch looks at in a block. Software Vulkan ends a loop silently after 65,535 turns (Mesa
@@ -43,6 +43,12 @@ impl KernelShape {
     pub fn block_pixels(self) -> usize {
         (self.block_side_px * self.block_side_px) as usize
     }
+
+    /// The specialisation constants 0, 1 and 2 of every kernel that works block by block.
+    pub(super) fn specialization(self) -> [(u32, u32); 3] {
+        let Self { block_side_px, pixels_per_thread } = self;
+        [(0, block_side_px * block_side_px / pixels_per_thread), (1, block_side_px), (2, pixels_per_thread)]
+    }
 }
 
 /// A variant of the kernel.
@@ -74,15 +80,8 @@ impl Variant {
     }
 
     fn specialization(self) -> [(u32, u32); 6] {
-        let KernelShape { block_side_px, pixels_per_thread } = self.shape;
-        [
-            (0, block_side_px * block_side_px / pixels_per_thread),
-            (1, block_side_px),
-            (2, pixels_per_thread),
-            (3, self.mode as u32),
-            (4, u32::from(self.masked)),
-            (5, u32::from(self.wide_sums)),
-        ]
+        let [threads, side, pixels] = self.shape.specialization();
+        [threads, side, pixels, (3, self.mode as u32), (4, u32::from(self.masked)), (5, u32::from(self.wide_sums))]
     }
 }
 
@@ -113,12 +112,12 @@ pub(super) struct EvaluatePass {
     pub under: Arc<Buffer>,
     pub marginal: Arc<Buffer>,
     pub sums: Arc<Buffer>,
-    lanes: Arc<Buffer>,
+    pub lanes: Arc<Buffer>,
+    pub targets: Arc<Buffer>,
+    pub masks: Arc<Buffer>,
     work: Arc<Buffer>,
     entries: Arc<Buffer>,
-    targets: Arc<Buffer>,
     parts: Arc<Buffer>,
-    masks: Arc<Image>,
     pipeline: Arc<ComputePipeline>,
     group: Arc<BindingGroup>,
     workgroups_per_row: u32,
@@ -136,7 +135,7 @@ impl EvaluatePass {
             )));
         }
         let buffers = create_buffers(device, lanes.len(), fly_count, pixel_count, shape)?;
-        let masks = create_masks(device, recorder, lanes.iter().map(|lane| &*lane.scene().masks))?;
+        let masks = create_mask_buffer(device, recorder, lanes.iter().map(|lane| &*lane.scene().masks))?;
         let variant = Variant::for_lanes(lanes, shape);
         let pipeline = create_pipeline(device, variant)?;
         let group = bind(&pipeline, &buffers, &masks)?;
@@ -244,39 +243,36 @@ fn create_buffers(
 
 /// The kernel in one of its variants.
 pub(super) fn create_pipeline(device: &Arc<Device>, variant: Variant) -> Result<Arc<ComputePipeline>> {
-    let mut bindings = [BindingKind::StorageBuffer; 11];
-    bindings[10] = BindingKind::SampledImage;
     ComputePipeline::create(
         device,
         &ComputeShader {
             name: "evaluate",
             spirv: &shaders::words(shaders::EVALUATE),
             specialization: &variant.specialization(),
-            bindings: &bindings,
+            bindings: &[BindingKind::StorageBuffer; 11],
             push_constant_bytes: size_of::<EvaluatePush>() as u32,
         },
     )
 }
 
-/// All layers of all mask sets, one set after the other, as a texture array.
-pub(super) fn create_masks<'a>(
+/// All layers of all mask sets, one set after the other, texel by texel.
+pub(super) fn create_mask_buffer<'a>(
     device: &Arc<Device>,
     recorder: &mut Recorder,
     sets: impl Iterator<Item = &'a MaskSet> + Clone,
-) -> Result<Arc<Image>> {
-    let side = MASK_SIDE as u32;
-    let layers = sets.clone().map(|set| set.layers().len() as u32).sum();
-    let shape = ImageShape { width_px: side, height_px: side, layers };
-    let image = Image::create(device, "masks", ImageFormat::Rg8Uint, shape)?;
+) -> Result<Arc<Buffer>> {
+    let layer_bytes = size_of::<[Texel; TEXELS]>() as u64;
+    let bytes = layer_bytes * sets.clone().map(|set| set.layers().len() as u64).sum::<u64>();
+    let buffer = Buffer::create(device, "masks", bytes, BufferUse::Storage, Residence::Device)?;
     for (layer, mask) in (0..).zip(sets.flat_map(MaskSet::layers)) {
-        recorder.write_image_layer(&image, layer, bytemuck::cast_slice(mask.texels()))?;
+        recorder.write_buffer(&buffer, layer * layer_bytes, bytemuck::cast_slice(mask.texels()))?;
     }
-    Ok(image)
+    Ok(buffer)
 }
 
-fn bind(pipeline: &ComputePipeline, buffers: &[Arc<Buffer>; 10], masks: &Arc<Image>) -> Result<Arc<BindingGroup>> {
+fn bind(pipeline: &ComputePipeline, buffers: &[Arc<Buffer>; 10], masks: &Arc<Buffer>) -> Result<Arc<BindingGroup>> {
     let mut bindings: Vec<Binding<'_>> = buffers.iter().map(Binding::Buffer).collect();
-    bindings.push(Binding::SampledImage(masks));
+    bindings.push(Binding::Buffer(masks));
     BindingGroup::create("evaluate", pipeline.layout(), &bindings)
 }
 

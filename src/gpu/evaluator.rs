@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
+use super::compose_pass::ComposePass;
 use super::evaluate_pass::{EvaluatePass, KernelShape, LIST_PIECE, LaneSpan};
 use super::layout::{FLAG_CONTINUED, FLAG_FRESH, FLAG_UNFINISHED, Tile, WorkItem};
 use super::mosaic_pass::MosaicPass;
+use super::translucent_pass::TranslucentPass;
 use crate::error::Result;
 use crate::model::blocks::index_of;
-use crate::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
+use crate::model::{Blend, Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
 use crate::vk::{Buffer, Device, Recorder, Timing};
 
 /// The evaluator of a Vulkan device.
@@ -15,12 +17,14 @@ pub struct GpuEvaluator {
     pub(super) device: Arc<Device>,
     pub(super) recorder: Recorder,
     pub(super) pass: EvaluatePass,
+    /// Only if any lane is translucent.
+    translucent: Option<TranslucentPass>,
     pub(super) lanes: Vec<Lane>,
     fitness: Vec<Fitness>,
     work: Work,
 }
 
-/// What the device last reported of a lane.
+/// What the device last reported of an opaque lane.
 #[derive(Clone, Debug)]
 struct Fitness {
     sae: u64,
@@ -60,9 +64,12 @@ impl GpuEvaluator {
         let lanes: Vec<Lane> = scenes.into_iter().map(|scene| Lane::new(scene, shape.block_side_px)).collect();
         let mut recorder = Recorder::create(device, "evaluator", Timing::Off)?;
         let pass = EvaluatePass::create(device, &mut recorder, &lanes, shape)?;
+        let translucent =
+            if lanes.iter().any(is_translucent) { Some(TranslucentPass::create(device, &pass, &lanes)?) } else { None };
         recorder.submit_and_wait()?;
         let fitness = lanes.iter().map(|lane| Fitness { sae: 0, marginal: vec![0; lane.tiles().len()] }).collect();
-        Ok(Self { device: Arc::clone(device), recorder, pass, lanes, fitness, work: Work::default() })
+        let work = Work::default();
+        Ok(Self { device: Arc::clone(device), recorder, pass, translucent, lanes, fitness, work })
     }
 
     /// The fly that shows at each pixel as the graphics pass draws it, or [`crate::model::NO_FLY`].
@@ -103,7 +110,11 @@ impl GpuEvaluator {
         while !pending.is_empty() {
             let mut rest = Vec::new();
             for block in &pending {
-                self.push_piece(*block, first_flags, &mut rest)?;
+                if is_translucent(&self.lanes[block.lane]) {
+                    self.push_stack(*block)?;
+                } else {
+                    self.push_piece(*block, first_flags, &mut rest)?;
+                }
             }
             if rest.is_empty() {
                 break;
@@ -114,6 +125,19 @@ impl GpuEvaluator {
         self.submit(lanes)?;
         pending.clear();
         self.work.pending = pending;
+        Ok(())
+    }
+
+    /// Adds a block of a translucent lane to the work.
+    fn push_stack(&mut self, Pending { lane, block, .. }: Pending) -> Result<()> {
+        let length = self.lanes[lane].lists().list(block as usize).len();
+        if self.translucent.as_ref().is_some_and(|pass| !pass.has_room(length)) {
+            self.submit(&[])?;
+        }
+        let first_pixel = self.first_pixel(lane, block);
+        if let Some(pass) = &mut self.translucent {
+            pass.add(lane, &self.lanes[lane], block, first_pixel);
+        }
         Ok(())
     }
 
@@ -134,7 +158,7 @@ impl GpuEvaluator {
             rest.push(Pending { from: piece.end, ..pending });
         }
         let (x, y) = lists.origin(pending.block as usize);
-        let first_pixel = self.pass.spans[pending.lane].first_pixel + pending.block as usize * self.block_pixels();
+        let first_pixel = self.first_pixel(pending.lane, pending.block);
         self.work.items.push(WorkItem {
             lane: pending.lane as u32,
             first_pixel: first_pixel as u32,
@@ -152,18 +176,22 @@ impl GpuEvaluator {
     /// Runs the collected work items, if any, and reads the fitness of `lanes` back.
     fn submit(&mut self, lanes: &[usize]) -> Result<()> {
         let (pass, recorder, work) = (&self.pass, &mut self.recorder, &mut self.work);
+        let parts = self.translucent.as_ref().map_or(Ok(None), |pass| pass.record(recorder))?;
         if !work.items.is_empty() {
             pass.write_work(recorder, &work.items, &work.entries)?;
             pass.record(recorder, work.items.len())?;
         }
         let mut tickets = Vec::with_capacity(lanes.len());
-        for &lane in lanes {
+        for &lane in lanes.iter().filter(|&&lane| !is_translucent(&self.lanes[lane])) {
             let span = &pass.spans[lane];
             let (offset, bytes) = marginal_range(span);
             let marginal = recorder.read_buffer(&pass.marginal, offset, bytes)?;
             tickets.push((lane, marginal, recorder.read_buffer(&pass.sums, lane as u64 * 8, 8)?));
         }
         recorder.submit_and_wait()?;
+        if let (Some(pass), Some(parts)) = (&mut self.translucent, parts) {
+            pass.absorb(recorder, &parts)?;
+        }
         for (lane, marginal, sum) in tickets {
             let fitness = &mut self.fitness[lane];
             recorder.read_into(&marginal, bytemuck::cast_slice_mut(&mut fitness.marginal))?;
@@ -179,8 +207,9 @@ impl GpuEvaluator {
         Ok(())
     }
 
-    pub(super) fn block_pixels(&self) -> usize {
-        self.pass.variant.shape.block_pixels()
+    /// Number of a block's first pixel in the layers.
+    fn first_pixel(&self, lane: usize, block: u32) -> usize {
+        self.pass.spans[lane].first_pixel + block as usize * self.pass.variant.shape.block_pixels()
     }
 
     /// One layer of a lane, read back and put in rows.
@@ -199,6 +228,11 @@ impl GpuEvaluator {
         let pixels = (0..target.height_px()).flat_map(|j| (0..target.width_px()).map(move |i| (i, j)));
         Ok(pixels.map(|(i, j)| blocked[place(i, j)]).collect())
     }
+}
+
+/// Whether the lane's fitness is the work of [`TranslucentPass`].
+fn is_translucent(lane: &Lane) -> bool {
+    lane.scene().masks.blend() == Blend::Translucent
 }
 
 /// Offset and size in bytes of a lane's marginal fitness.
@@ -245,8 +279,13 @@ impl Evaluator for GpuEvaluator {
     }
 
     fn evaluation(&self, lane: usize) -> Evaluation<'_> {
-        let Fitness { sae, marginal } = &self.fitness[lane];
-        Evaluation { sae: *sae, marginal }
+        match &self.translucent {
+            Some(pass) if is_translucent(&self.lanes[lane]) => pass.evaluation(lane),
+            _ => {
+                let Fitness { sae, marginal } = &self.fitness[lane];
+                Evaluation { sae: *sae, marginal }
+            }
+        }
     }
 
     fn read_back_layers(&mut self, lane: usize) -> Result<Layers> {
@@ -255,6 +294,10 @@ impl Evaluator for GpuEvaluator {
     }
 
     fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
+        if population.masks.blend() == Blend::Translucent {
+            let pass = ComposePass::create(&self.device, &mut self.recorder, population, canvas, supersampling)?;
+            return pass.draw(&mut self.recorder, canvas, supersampling);
+        }
         let samples = canvas.supersampled(supersampling);
         let pass = MosaicPass::create(&self.device, &mut self.recorder, population, &samples)?;
         pass.draw(&mut self.recorder, canvas, supersampling)

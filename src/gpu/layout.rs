@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 pub use crate::model::Tile;
 
-/// `Lane` of `glsl/evaluate.comp`: where one picture lies in the buffers that all lanes share.
+/// `Lane` of `glsl/shared/lane.glsl`: where one picture lies in the buffers that all lanes share.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct LaneRecord {
@@ -57,6 +57,76 @@ pub struct EvaluatePush {
     pub left_out_fly: u32,
     /// Added to the index of each lane's sum.
     pub sum_offset: u32,
+}
+
+/// `StackItem` of `glsl/translucent.comp`: one block of pixels and its list of tiles, or a piece of the work on it.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct StackItem {
+    /// Index of the block's lane.
+    pub lane: u32,
+    /// Index of the block's first pixel in the layers.
+    pub first_pixel: u32,
+    /// Left column of the block in px.
+    pub x: i32,
+    /// Top row of the block in px.
+    pub y: i32,
+    /// Index of the first entry that is collected.
+    pub first_entry: u32,
+    /// How many entries are collected.
+    pub entry_count: u32,
+    /// Place of the first of them in the block's list.
+    pub first_slot: u32,
+    /// [`FLAG_CONTINUED`], [`FLAG_UNFINISHED`] or both.
+    pub flags: u32,
+    /// Rank of the first layer that is left out.
+    pub first_rank: u32,
+    /// Rank after the last layer that is left out; equal to the first while layers are still collected.
+    pub end_rank: u32,
+    /// Index of the block's first word of scratch.
+    pub scratch: u32,
+    /// Index of the part of the list's first fly.
+    pub first_part: u32,
+    /// Index of the block's error among the parts.
+    pub error: u32,
+}
+
+/// `Push` of `glsl/translucent.comp`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct TranslucentPush {
+    /// Index of the dispatch's first item.
+    pub first_item: u32,
+    /// Number of its items.
+    pub item_count: u32,
+}
+
+/// `ComposeItem` of `glsl/compose.comp`: one block of samples and its list of tiles, or a piece of that list.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct ComposeItem {
+    /// Left column of the block on the canvas of samples.
+    pub x: i32,
+    /// Top row of the block.
+    pub y: i32,
+    /// Index of the list's first entry.
+    pub first_entry: u32,
+    /// Length of the list.
+    pub entry_count: u32,
+    /// Index of the block's first colour.
+    pub first_sample: u32,
+    /// [`FLAG_CONTINUED`], [`FLAG_UNFINISHED`] or both.
+    pub flags: u32,
+}
+
+/// `Push` of `glsl/compose.comp`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct ComposePush {
+    /// Number of work items.
+    pub item_count: u32,
+    /// Packed background colour.
+    pub background: u32,
 }
 
 /// `Instance` of `glsl/mosaic.vert`: the transform from the unit square to the canvas.

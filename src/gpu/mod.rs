@@ -2,12 +2,14 @@
 //!
 //! Each pass has a shader of the same stem in `glsl/` and a twin of the same stem in `cpu/`, and gives the same bits.
 
+mod compose_pass;
 mod evaluate_pass;
 mod evaluator;
 pub mod layout;
 mod mosaic_pass;
 mod re_render;
 mod shaders;
+mod translucent_pass;
 
 pub use evaluate_pass::KernelShape;
 pub use evaluator::GpuEvaluator;

@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use glam::{DAffine2, DMat2, DVec2};
 
-use super::evaluate_pass::create_masks;
 use super::layout::{Instance, MosaicPush, Tile};
 use super::shaders;
 use crate::error::Result;
 use crate::model::blocks::{BlockLists, depth_order, index_of};
-use crate::model::{Canvas, Fly, Mosaic, NO_FLY, Patch, Population};
+use crate::model::mask::MASK_SIDE;
+use crate::model::{Canvas, Fly, MaskSet, Mosaic, NO_FLY, Patch, Population};
 use crate::vk::{
     Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, DepthTest, Device,
     GraphicsPipeline, GraphicsShaders, Image, ImageFormat, ImageShape, Recorder, RenderTargets, Residence,
@@ -49,7 +49,7 @@ impl MosaicPass {
         let tile_buffer = storage("mosaic tiles", tiles.len() * size_of::<Tile>())?;
         recorder.write_buffer(&tile_buffer, 0, bytemuck::cast_slice(&tiles))?;
         let instances = storage("mosaic instances", tiles.len() * size_of::<Instance>())?;
-        let masks = create_masks(device, recorder, std::iter::once(&population.masks))?;
+        let masks = create_masks(device, recorder, &population.masks)?;
         let pipeline = create_pipeline(device)?;
         let bindings = [Binding::Buffer(&tile_buffer), Binding::Buffer(&instances), Binding::SampledImage(&masks)];
         let side = PATCH_SIDE.min(device.info().limits.image_side_px);
@@ -109,15 +109,13 @@ impl MosaicPass {
         lists.fill(&self.flies, &self.tiles);
         let mut pixels = vec![0_u32; shape.width_px as usize * shape.height_px as usize];
         for number in 0..lists.block_count() {
-            let (x, y) = lists.origin(number);
-            let (width_px, height_px) = (side.min(self.samples.width_px - x), side.min(self.samples.height_px - y));
-            let patch = Patch { x, y, width_px, height_px };
+            let patch = lists.patch(number, &self.samples);
             self.record(recorder, &patch, lists.list(number))?;
             let ticket = recorder.read_image(attachment)?;
             recorder.submit_and_wait()?;
             recorder.read_into(&ticket, bytemuck::cast_slice_mut(&mut pixels))?;
-            let rows = pixels.chunks_exact(shape.width_px as usize).take(height_px as usize);
-            let packed: Vec<u32> = rows.flat_map(|row| &row[..width_px as usize]).copied().collect();
+            let rows = pixels.chunks_exact(shape.width_px as usize).take(patch.height_px as usize);
+            let packed: Vec<u32> = rows.flat_map(|row| &row[..patch.width_px as usize]).copied().collect();
             take(&patch, &packed);
         }
         Ok(())
@@ -158,6 +156,17 @@ impl MosaicPass {
             rank: self.ranks[fly as usize],
         }
     }
+}
+
+/// All layers of a mask set as a texture array.
+fn create_masks(device: &Arc<Device>, recorder: &mut Recorder, set: &MaskSet) -> Result<Arc<Image>> {
+    let side = MASK_SIDE as u32;
+    let shape = ImageShape { width_px: side, height_px: side, layers: set.layers().len() as u32 };
+    let image = Image::create(device, "masks", ImageFormat::Rg8Uint, shape)?;
+    for (layer, mask) in (0..).zip(set.layers()) {
+        recorder.write_image_layer(&image, layer, bytemuck::cast_slice(mask.texels()))?;
+    }
+    Ok(image)
 }
 
 /// The transform from the square [-1, 1]² to a quad, in px of the canvas, that holds the tile and a pixel around it.

@@ -4,6 +4,7 @@
 //! top, the second its under. A birth changes only the lists of the blocks that its two boxes touch.
 
 use super::fly::Fly;
+use super::mosaic::Patch;
 use super::tile::{Canvas, Tile};
 
 /// Depth-ordered tile lists of all blocks of a canvas. Blocks are numbered row by row from the top left.
@@ -70,6 +71,14 @@ impl BlockLists {
     pub fn origin(&self, block: usize) -> (u32, u32) {
         let block = block as u32;
         (block % self.columns * self.side_px, block / self.columns * self.side_px)
+    }
+
+    /// The part of `canvas`, whose blocks these are, that `block` covers.
+    #[must_use]
+    pub fn patch(&self, block: usize, canvas: &Canvas) -> Patch {
+        let (x, y) = self.origin(block);
+        let (width_px, height_px) = (self.side_px.min(canvas.width_px - x), self.side_px.min(canvas.height_px - y));
+        Patch { x, y, width_px, height_px }
     }
 
     /// Lists of a whole population, replacing what was there.

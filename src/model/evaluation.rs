@@ -30,12 +30,13 @@ pub struct Evaluation<'a> {
     pub marginal: &'a [i64],
 }
 
-/// Per pixel, row by row, the two nearest flies that cover it, or [`NO_FLY`].
+/// Per pixel, row by row, the two nearest flies that cover it, or [`NO_FLY`]. A translucent fly covers a pixel where its
+/// coverage is above 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers {
-    /// The fly that shows.
+    /// The fly that shows, or of translucent ones the nearest that does.
     pub top: Vec<u32>,
-    /// The fly that would show without the top one.
+    /// The fly that would show without the top one, or of translucent ones the next.
     pub under: Vec<u32>,
 }
 

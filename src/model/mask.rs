@@ -4,6 +4,8 @@ use crate::error::{Error, Result};
 
 /// Texels along each side of a mask layer.
 pub const MASK_SIDE: usize = 256;
+/// Texels of a mask layer.
+pub const TEXELS: usize = MASK_SIDE * MASK_SIDE;
 /// Coverage from which a texel belongs to the tile; below it the tile has a hole there.
 pub const COVERAGE_THRESHOLD: u8 = 128;
 /// Largest number of layers in a set: what every Vulkan 1.3 device offers in an array image.
@@ -15,7 +17,7 @@ pub enum Blend {
     /// The tile is there from [`COVERAGE_THRESHOLD`] on, and hides what lies behind it.
     #[default]
     Opaque,
-    /// Coverage is the tile's opacity: 0 shows what lies behind, 255 hides it.
+    /// Coverage is the tile's opacity: 0 shows what lies behind, 255 hides it ([`super::translucency`]).
     Translucent,
 }
 
@@ -32,7 +34,7 @@ pub struct Texel {
 /// A tile shape of [`MASK_SIDE`] x [`MASK_SIDE`] texels; row 0 lies at v = -h/2, column 0 at u = -w/2.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
-    texels: Vec<Texel>,
+    texels: Box<[Texel; TEXELS]>,
 }
 
 impl Mask {
@@ -41,24 +43,21 @@ impl Mask {
     /// # Errors
     /// [`Error::Usage`] if there are not exactly [`MASK_SIDE`]² texels.
     pub fn new(texels: Vec<Texel>) -> Result<Self> {
-        if texels.len() != MASK_SIDE * MASK_SIDE {
-            return Err(Error::Usage(format!(
-                "a mask needs {MASK_SIDE}x{MASK_SIDE} texels, this one has {}",
-                texels.len()
-            )));
-        }
-        Ok(Self { texels })
+        let wrong = |texels: Box<[Texel]>| {
+            Error::Usage(format!("a mask needs {MASK_SIDE}x{MASK_SIDE} texels, this one has {}", texels.len()))
+        };
+        Ok(Self { texels: texels.into_boxed_slice().try_into().map_err(wrong)? })
     }
 
     /// The full square: every texel covered at full brightness.
     #[must_use]
     pub fn square() -> Self {
-        Self { texels: vec![Texel { coverage: 255, shade: 255 }; MASK_SIDE * MASK_SIDE] }
+        Self { texels: Box::new([Texel { coverage: 255, shade: 255 }; TEXELS]) }
     }
 
     /// The texels, row by row.
     #[must_use]
-    pub fn texels(&self) -> &[Texel] {
+    pub fn texels(&self) -> &[Texel; TEXELS] {
         &self.texels
     }
 
@@ -119,8 +118,10 @@ impl MaskSet {
     }
 }
 
-/// `color` under a texel's shade: each channel `(c * shade + 127) / 255`.
+/// A packed colour under a texel's shade: each channel `(c * shade + 127) / 255`.
+#[inline(always)]
 #[must_use]
-pub fn shaded(color: [u8; 3], shade: u8) -> [u8; 3] {
-    color.map(|channel| ((u32::from(channel) * u32::from(shade) + 127) / 255) as u8)
+pub fn shaded(color: u32, shade: u32) -> u32 {
+    let channel = |shift: u32| ((color >> shift & 255) * shade + 127) / 255 << shift;
+    channel(0) | channel(8) | channel(16)
 }

@@ -13,8 +13,10 @@ pub mod operators;
 pub mod population;
 pub mod rng;
 pub mod tables;
+pub mod tally;
 pub mod target;
 pub mod tile;
+pub mod translucency;
 
 pub use evaluation::{Change, Evaluation, Evaluator, Layers, NO_FLY};
 pub use fly::Fly;

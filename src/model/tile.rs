@@ -40,6 +40,10 @@ pub struct Tile {
     pub color: u32,
     /// Layer of the mask set; 0 is the full square and is never looked up.
     pub mask: u32,
+    /// [`inverse`] of the width: texels are found without a division per pixel.
+    pub w_inverse: u32,
+    /// [`inverse`] of the height.
+    pub h_inverse: u32,
 }
 
 /// What a population is drawn on: its size, and how many canvas pixels one picture pixel spans.
@@ -82,8 +86,22 @@ impl Canvas {
 
 impl Tile {
     /// A tile that covers nothing.
-    pub const EMPTY: Self =
-        Self { x0: 1, y0: 1, x1: 0, y1: 0, u0: 0, v0: 0, cos: 0, sin: 0, w: 0, h: 0, color: 0, mask: 0 };
+    pub const EMPTY: Self = Self {
+        x0: 1,
+        y0: 1,
+        x1: 0,
+        y1: 0,
+        u0: 0,
+        v0: 0,
+        cos: 0,
+        sin: 0,
+        w: 0,
+        h: 0,
+        color: 0,
+        mask: 0,
+        w_inverse: 0,
+        h_inverse: 0,
+    };
 
     /// The tile of `fly` on `canvas`; [`Tile::EMPTY`] if the fly is absent or its tile misses the canvas.
     ///
@@ -127,6 +145,8 @@ impl Tile {
             h: h as u32,
             color: pack(fly.color()),
             mask: u32::from(fly.mask),
+            w_inverse: inverse(w as u32),
+            h_inverse: inverse(h as u32),
         }
     }
 
@@ -162,15 +182,49 @@ impl Tile {
         (u as u32, v as u32)
     }
 
-    /// The mask texel (column, row) at tile coordinates `(u, v)` of a covered pixel.
-    ///
-    /// `floor(u * 256 / (w * 4096))`, exactly, in 32 bits.
-    #[inline]
+    /// Whether the tile may cover a pixel of a block of `side` x `side` px, at most a few dozen, that touches its box and
+    /// whose upper left pixel is `(x, y)`. Turned tiles fill half of their boxes, so many a block is spared.
+    #[inline(always)]
+    #[must_use]
+    pub fn may_cover(&self, (x, y): (i32, i32), side: i32) -> bool {
+        let (u, v) = self.coordinates(x, y);
+        let overlaps = |first: u32, step: i32, other_step: i32, end: u32| {
+            let (first, reach) = (i64::from(first as i32), i64::from(side - 1));
+            let low = first + reach * i64::from(step.min(0) + other_step.min(0));
+            let high = first + reach * i64::from(step.max(0) + other_step.max(0));
+            (high >= 0) & (low < i64::from(end))
+        };
+        overlaps(u, self.cos, self.sin, self.u_end()) & overlaps(v, -self.sin, self.cos, self.v_end())
+    }
+
+    /// The mask texel (column, row) at tile coordinates `(u, v)` of a covered pixel: `floor(u * 256 / (w * 4096))`,
+    /// exactly, in 32 bits. Elsewhere both are any numbers.
+    #[inline(always)]
     #[must_use]
     pub fn texel(&self, u: u32, v: u32) -> (u32, u32) {
         const STEPS_PER_TEXEL: u32 = TRIG_ONE as u32 / MASK_SIDE as u32;
-        ((u / STEPS_PER_TEXEL) / self.w, (v / STEPS_PER_TEXEL) / self.h)
+        (quotient(u / STEPS_PER_TEXEL, self.w, self.w_inverse), quotient(v / STEPS_PER_TEXEL, self.h, self.h_inverse))
     }
+}
+
+/// What [`quotient`] multiplies by instead of dividing by `divisor`, 1 to 2^18: `2^(23 + shift) / divisor` in 24 bits,
+/// above it the shift that leaves 16 bits of any `value < divisor << 8`.
+#[must_use]
+pub fn inverse(divisor: u32) -> u32 {
+    let shift = (24 - divisor.leading_zeros().min(24)) as u64;
+    (shift << 24 | ((1 << (23 + shift)) - 1) / u64::from(divisor)) as u32
+}
+
+/// `value / divisor` for `value < divisor << 8`, given the divisor's [`inverse`]; any number for other values.
+///
+/// Of the quotient, below 2^8, the shift loses less than 2^-7, and so does the inverse with its 15 bits at least: the
+/// estimate is the quotient or one less. All products fit 32 bits.
+#[inline(always)]
+fn quotient(value: u32, divisor: u32, inverse: u32) -> u32 {
+    let estimate = (value >> (inverse >> 24)).wrapping_mul(inverse & 0xFF_FFFF) >> 23;
+    // 0 if the estimate is one less, else -1: without a comparison, which would not stay in a vector.
+    let is_enough = value.wrapping_sub(estimate.wrapping_mul(divisor)).wrapping_sub(divisor) as i32 >> 31;
+    estimate.wrapping_add(1).wrapping_add(is_enough as u32)
 }
 
 impl Fly {
@@ -237,6 +291,18 @@ mod tests {
         let inside = |(i, j): &(i32, i32)| (tile.x0..=tile.x1).contains(i) && (tile.y0..=tile.y1).contains(j);
         let pixels = (0..canvas.height_px as i32).flat_map(|j| (0..canvas.width_px as i32).map(move |i| (i, j)));
         pixels.filter(inside).filter(|&(i, j)| covered(&tile, i, j)).count()
+    }
+
+    #[test]
+    fn texels_without_a_division_are_those_of_the_division() {
+        for divisor in 1..=SIDE_MAX {
+            let inverse = inverse(divisor);
+            for texel in 0..256 {
+                let (first, last) = (texel * divisor, texel * divisor + divisor - 1);
+                assert_eq!(quotient(first, divisor, inverse), texel, "{first} / {divisor}");
+                assert_eq!(quotient(last, divisor, inverse), texel, "{last} / {divisor}");
+            }
+        }
     }
 
     #[test]

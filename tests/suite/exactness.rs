@@ -5,13 +5,17 @@ use std::sync::Arc;
 use smalti::cpu::CpuEvaluator;
 use smalti::gpu::{GpuEvaluator, KernelShape};
 use smalti::model::fly::SIDE_MAX;
-use smalti::model::{Canvas, Change, Evaluator, Fly, NO_FLY, Population, Scene, Target};
+use smalti::model::mask::Texel;
+use smalti::model::{Blend, Canvas, Change, Evaluator, Fly, Mask, MaskSet, NO_FLY, Population, Scene, Target};
 
 use smalti::vk::{DeviceOptions, Staging};
 
 use crate::canary;
 use crate::reference::Reference;
-use crate::scenarios::{Scenario, any_fly, holed_masks, random_scene, scenarios, stream};
+use crate::scenarios::{
+    Scenario, any_fly, deep_stacks, holed_masks, random_scene, scenarios, stream, translucent_masks,
+    translucent_scenarios,
+};
 
 /// Flies whose marginal fitness is also checked by leaving them out of a whole picture.
 const RE_RENDERS: usize = 500;
@@ -48,6 +52,13 @@ fn population(scene: &Scene, flies: &[Fly]) -> Population {
 }
 
 #[test]
+fn on_the_cpu_translucent_fitness_layers_and_mosaic_equal_brute_force() {
+    for scenario in translucent_scenarios().into_iter().chain(deep_stacks()) {
+        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &scenario);
+    }
+}
+
+#[test]
 fn on_the_cpu_fitness_layers_and_mosaic_equal_brute_force() {
     for scenario in scenarios() {
         check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &scenario);
@@ -68,18 +79,54 @@ fn on_vulkan_fitness_layers_and_mosaic_equal_brute_force() {
 }
 
 #[test]
+fn on_vulkan_translucent_fitness_layers_and_mosaic_equal_brute_force() {
+    for scenario in translucent_scenarios().into_iter().chain(deep_stacks()) {
+        canary::with_device(&DeviceOptions::default(), |device| {
+            let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
+            check_scenario(&mut evaluator, &scenario);
+        });
+    }
+}
+
+#[test]
 fn every_kernel_shape_gives_the_same_numbers_directly_and_through_staging() {
     for (block_side_px, pixels_per_thread) in [(8, 1), (8, 4), (16, 4), (16, 8), (32, 4)] {
         let options = DeviceOptions { staging: Staging::Forced, ..DeviceOptions::default() };
         canary::with_device(&options, |device| {
             let shape = KernelShape { block_side_px, pixels_per_thread };
-            for scenario in scenarios().iter().filter(|scenario| scenario.flies.len() <= 300) {
+            let all = scenarios().into_iter().chain(translucent_scenarios());
+            for scenario in &all.filter(|scenario| scenario.flies.len() <= 300).collect::<Vec<_>>() {
                 let scenes = vec![scenario.scene.clone()];
                 let mut evaluator = GpuEvaluator::create_with_shape(&device, scenes, shape).expect("it fits");
                 check_scenario(&mut evaluator, scenario);
             }
         });
     }
+}
+
+#[test]
+fn translucent_tiles_are_drawn_alike_at_any_size_and_supersampling() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        for Scenario { name, scene, flies } in translucent_scenarios().into_iter().chain(deep_stacks()) {
+            let (width_px, height_px) = (scene.target.width_px(), scene.target.height_px());
+            if width_px.max(height_px) > 256 {
+                continue;
+            }
+            let population = population(&scene, &flies);
+            let mut cpu = CpuEvaluator::new(vec![scene.clone()]);
+            let mut vulkan = GpuEvaluator::create(&device, vec![scene]).expect("it fits");
+            // The last spans several patches of samples.
+            let sizes = [(17, 1), (150, 3), (1_100, 1)];
+            for (long_side_px, supersampling) in sizes.into_iter().take(if flies.len() > 1_000 { 1 } else { 3 }) {
+                let canvas = Canvas::scaled(width_px, height_px, long_side_px);
+                let draw = |evaluator: &mut dyn Evaluator| {
+                    evaluator.draw(&population, &canvas, supersampling).expect("the evaluator works")
+                };
+                let same = draw(&mut cpu) == draw(&mut vulkan);
+                assert!(same, "{name} at {long_side_px} px with {supersampling}² samples");
+            }
+        }
+    });
 }
 
 /// 10,000 births, in batches of 1 to 100, then the same population loaded afresh.
@@ -115,9 +162,18 @@ fn incremental_scene() -> Scene {
     Scene { masks: Arc::new(holed_masks()), ..random_scene(120, 90, 400, &mut stream(3)) }
 }
 
+fn incremental_translucent_scene() -> Scene {
+    Scene { masks: Arc::new(translucent_masks(&mut stream(4))), ..incremental_scene() }
+}
+
 #[test]
 fn on_the_cpu_the_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
     check_incremental(&mut CpuEvaluator::new(vec![incremental_scene()]));
+}
+
+#[test]
+fn on_the_cpu_the_translucent_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
+    check_incremental(&mut CpuEvaluator::new(vec![incremental_translucent_scene()]));
 }
 
 #[test]
@@ -127,11 +183,19 @@ fn on_vulkan_the_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
     });
 }
 
-/// Loads and changes three lanes together, and each alone; all fitness must agree.
+#[test]
+fn on_vulkan_the_translucent_state_after_ten_thousand_births_equals_a_fresh_evaluation() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_incremental(&mut GpuEvaluator::create(&device, vec![incremental_translucent_scene()]).expect("it fits"));
+    });
+}
+
+/// Loads and changes four lanes together, and each alone; all fitness must agree.
 fn check_lanes(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
     let mut random = stream(11);
     let masked = Scene { masks: Arc::new(holed_masks()), ..random_scene(70, 20, 90, &mut random) };
-    let scenes = vec![random_scene(33, 65, 120, &mut random), masked, random_scene(8, 8, 7, &mut random)];
+    let foggy = Scene { masks: Arc::new(translucent_masks(&mut random)), ..random_scene(40, 41, 100, &mut random) };
+    let scenes = vec![random_scene(33, 65, 120, &mut random), foggy, masked, random_scene(8, 8, 7, &mut random)];
     let populations: Vec<Vec<Fly>> = scenes
         .iter()
         .map(|scene| (0..scene.fly_count).map(|_| any_fly(scene, 1.0..20.0, &mut random)).collect())
@@ -140,7 +204,7 @@ fn check_lanes(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
         let index = scenes[lane].fly_count as u32 / 2;
         Change { lane, index, fly: any_fly(&scenes[lane], 1.0..20.0, random) }
     };
-    let changes: Vec<Change> = (0..3).map(|lane| change(lane, &mut random)).collect();
+    let changes: Vec<Change> = (0..scenes.len()).map(|lane| change(lane, &mut random)).collect();
 
     let mut together = create(scenes.clone());
     let loads: Vec<(usize, &[Fly])> = populations.iter().map(Vec::as_slice).enumerate().collect();
@@ -157,14 +221,49 @@ fn check_lanes(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
 }
 
 #[test]
-fn on_the_cpu_three_lanes_of_different_sizes_equal_three_single_ones() {
+fn on_the_cpu_lanes_of_different_sizes_and_blends_equal_single_ones() {
     check_lanes(|scenes| Box::new(CpuEvaluator::new(scenes)));
 }
 
 #[test]
-fn on_vulkan_three_lanes_of_different_sizes_equal_three_single_ones() {
+fn on_vulkan_lanes_of_different_sizes_and_blends_equal_single_ones() {
     canary::with_device(&DeviceOptions::default(), |device| {
         check_lanes(|scenes| Box::new(GpuEvaluator::create(&device, scenes).expect("it fits")));
+    });
+}
+
+/// With coverage of nothing or all, translucent tiles are opaque ones.
+fn check_opaque_equivalence(mut create: impl FnMut(Scene) -> Box<dyn Evaluator>) {
+    let mut random = stream(12);
+    let texel = |texel: &Texel| Texel { coverage: if texel.coverage < 128 { 0 } else { 255 }, ..*texel };
+    let holed = holed_masks();
+    let layers = holed.layers()[1..].iter().map(|mask| Mask::new(mask.texels().iter().map(texel).collect()));
+    let masks = MaskSet::with_layers(layers.collect::<Result<_, _>>().expect("full layers")).expect("few layers");
+    let scene = Scene { background: [1, 99, 200], ..random_scene(75, 50, 220, &mut random) };
+    let flies: Vec<Fly> = (0..scene.fly_count)
+        .map(|index| Fly { mask: index as u16 % 3, ..any_fly(&scene, 1.0..20.0, &mut random) })
+        .collect();
+    let mut evaluate = |blend: Blend| {
+        let scene = Scene { masks: Arc::new(masks.clone().with_blend(blend)), ..scene.clone() };
+        let mut evaluator = create(scene.clone());
+        evaluator.load(&[(0, &flies)]).expect("the evaluator works");
+        let evaluation = (evaluator.evaluation(0).sae, evaluator.evaluation(0).marginal.to_vec());
+        let layers = evaluator.read_back_layers(0).expect("the evaluator works");
+        let canvas = Canvas::scaled(75, 50, 120);
+        (evaluation, layers, evaluator.draw(&population(&scene, &flies), &canvas, 2).expect("the evaluator works"))
+    };
+    assert_eq!(evaluate(Blend::Opaque), evaluate(Blend::Translucent));
+}
+
+#[test]
+fn on_the_cpu_translucent_tiles_of_all_or_nothing_equal_opaque_ones() {
+    check_opaque_equivalence(|scene| Box::new(CpuEvaluator::new(vec![scene])));
+}
+
+#[test]
+fn on_vulkan_translucent_tiles_of_all_or_nothing_equal_opaque_ones() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_opaque_equivalence(|scene| Box::new(GpuEvaluator::create(&device, vec![scene]).expect("it fits")));
     });
 }
 

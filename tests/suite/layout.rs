@@ -4,7 +4,10 @@ use std::fs;
 use std::mem::offset_of;
 use std::path::Path;
 
-use smalti::gpu::layout::{EvaluatePush, Instance, LaneRecord, MosaicPush, Tile, WorkItem};
+use smalti::gpu::layout::{
+    ComposeItem, ComposePush, EvaluatePush, Instance, LaneRecord, MosaicPush, StackItem, Tile, TranslucentPush,
+    WorkItem,
+};
 
 use crate::shader_manifest::STAGES;
 use crate::spirv::{Member, MemoryStruct, memory_structs};
@@ -74,22 +77,37 @@ macro_rules! twin {
 
 fn twins() -> Vec<Twin> {
     vec![
-        twin!(Tile = "Tile" in Array of ["evaluate.comp", "mosaic.frag"] {
+        twin!(Tile = "Tile" in Array of ["compose.comp", "evaluate.comp", "mosaic.frag", "translucent.comp"] {
             x0 = "x0", y0 = "y0", x1 = "x1", y1 = "y1", u0 = "u0", v0 = "v0", cos = "cos_step", sin = "sin_step",
-            w = "w", h = "h", color = "color", mask = "mask"
+            w = "w", h = "h", color = "color", mask = "mask", w_inverse = "w_inverse", h_inverse = "h_inverse"
         }),
-        twin!(LaneRecord = "Lane" in Array of ["evaluate.comp"] {
+        twin!(LaneRecord = "Lane" in Array of ["evaluate.comp", "translucent.comp"] {
             first_fly = "first_fly", first_mask = "first_mask", background = "background", sum = "sum"
         }),
         twin!(WorkItem = "WorkItem" in Array of ["evaluate.comp"] {
             lane = "lane", first_pixel = "first_pixel", x = "x", y = "y", first_entry = "first_entry",
             entry_count = "entry_count", flags = "flags", padding = "padding"
         }),
+        twin!(StackItem = "StackItem" in Array of ["translucent.comp"] {
+            lane = "lane", first_pixel = "first_pixel", x = "x", y = "y", first_entry = "first_entry",
+            entry_count = "entry_count", first_slot = "first_slot", flags = "flags", first_rank = "first_rank",
+            end_rank = "end_rank", scratch = "scratch", first_part = "first_part", error = "error"
+        }),
+        twin!(ComposeItem = "ComposeItem" in Array of ["compose.comp"] {
+            x = "x", y = "y", first_entry = "first_entry", entry_count = "entry_count", first_sample = "first_sample",
+            flags = "flags"
+        }),
         twin!(Instance = "Instance" in Array of ["mosaic.vert"] {
             axis_u = "axis_u", axis_v = "axis_v", centre = "centre", fly = "fly", rank = "rank"
         }),
         twin!(EvaluatePush = "Push" in PushConstants of ["evaluate.comp"] {
             item_count = "item_count", left_out_fly = "left_out_fly", sum_offset = "sum_offset"
+        }),
+        twin!(TranslucentPush = "Push" in PushConstants of ["translucent.comp"] {
+            first_item = "first_item", item_count = "item_count"
+        }),
+        twin!(ComposePush = "Push" in PushConstants of ["compose.comp"] {
+            item_count = "item_count", background = "background"
         }),
         twin!(MosaicPush = "Push" in PushConstants of ["mosaic.vert", "mosaic.frag"] {
             origin = "origin", pixel_size = "pixel_size", first_mask = "first_mask"

@@ -3,13 +3,21 @@
 use smalti::model::blocks::index_of;
 use smalti::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE, MaskSet};
 use smalti::model::tables::cos_sin;
-use smalti::model::{Fly, Scene};
+use smalti::model::{Blend, Fly, Scene};
 
-/// What each pixel of a picture shows, farthest to nearest, with every fly that covers it.
+/// What each pixel of a picture shows, nearest to farthest, with every fly that covers it.
 pub struct Reference {
     scene: Scene,
-    /// Per pixel, row by row: (depth key, colour) of every covering fly, nearest first.
-    stacks: Vec<Vec<(u64, [u8; 3])>>,
+    /// Per pixel, row by row: every covering fly, nearest first.
+    stacks: Vec<Vec<Layer>>,
+}
+
+/// What a fly shows at a pixel. Depth comes first, so that layers sort by it.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Layer {
+    key: u64,
+    color: [u8; 3],
+    coverage: u8,
 }
 
 impl Reference {
@@ -22,10 +30,8 @@ impl Reference {
             let (x, y) = (i64::from(fly.x) / 64, i64::from(fly.y) / 64);
             for j in (y - reach).max(0)..(y + reach + 1).min(height) {
                 for i in (x - reach).max(0)..(x + reach + 1).min(width) {
-                    if let Some(color) = color_at(fly, &scene.masks, i, j) {
-                        let key = (u64::from(fly.z) << 32) | index as u64;
-                        stacks[(j * width + i) as usize].push((key, color));
-                    }
+                    let key = (u64::from(fly.z) << 32) | index as u64;
+                    stacks[(j * width + i) as usize].extend(layer_at(fly, key, &scene.masks, i, j));
                 }
             }
         }
@@ -40,11 +46,13 @@ impl Reference {
 
     /// Marginal fitness of every fly: the error of each pixel with and without each fly that covers it.
     pub fn marginal(&self, fly_count: usize) -> Vec<i64> {
+        // The third fly from the top of an opaque pixel matters to nobody, and neither do those behind it.
+        let depth = if self.scene.masks.blend() == Blend::Opaque { 3 } else { usize::MAX };
         let mut marginal = vec![0; fly_count];
         for pixel in 0..self.stacks.len() {
             let with = self.error_without(pixel, None) as i64;
-            for &(key, _) in self.stacks[pixel].iter().take(3) {
-                let fly = index_of(key);
+            for layer in self.stacks[pixel].iter().take(depth) {
+                let fly = index_of(layer.key);
                 marginal[fly as usize] += self.error_without(pixel, Some(fly)) as i64 - with;
             }
         }
@@ -53,24 +61,49 @@ impl Reference {
 
     /// The `depth`-th nearest fly of every pixel (0 is the top), or `u32::MAX`.
     pub fn layer(&self, depth: usize) -> Vec<u32> {
-        self.stacks.iter().map(|stack| stack.get(depth).map_or(u32::MAX, |&(key, _)| index_of(key))).collect()
+        self.stacks.iter().map(|stack| stack.get(depth).map_or(u32::MAX, |layer| index_of(layer.key))).collect()
     }
 
     /// The colours that show.
     pub fn colors(&self) -> Vec<[u8; 3]> {
-        self.stacks.iter().map(|stack| stack.first().map_or(self.scene.background, |&(_, color)| color)).collect()
+        (0..self.stacks.len()).map(|pixel| self.color_without(pixel, None)).collect()
     }
 
     fn error_without(&self, pixel: usize, left_out: Option<u32>) -> u64 {
-        let shown = self.stacks[pixel].iter().find(|&&(key, _)| Some(index_of(key)) != left_out);
-        let color = shown.map_or(self.scene.background, |&(_, color)| color);
-        let target = self.scene.target.pixels()[pixel];
+        let (color, target) = (self.color_without(pixel, left_out), self.scene.target.pixels()[pixel]);
         color.iter().zip(target).map(|(&shown, wanted)| u64::from(shown.abs_diff(wanted))).sum()
+    }
+
+    fn color_without(&self, pixel: usize, left_out: Option<u32>) -> [u8; 3] {
+        let background = self.scene.background;
+        let mut layers = self.stacks[pixel].iter().filter(|layer| Some(index_of(layer.key)) != left_out);
+        match self.scene.masks.blend() {
+            Blend::Opaque => layers.next().map_or(background, |layer| layer.color),
+            Blend::Translucent => composite(layers, background),
+        }
     }
 }
 
-/// The colour that `fly` shows at pixel `(i, j)`, if it covers it.
-fn color_at(fly: &Fly, masks: &MaskSet, i: i64, j: i64) -> Option<[u8; 3]> {
+/// Layers over one another, nearest first, in 16-bit fixed point.
+fn composite<'a>(layers: impl Iterator<Item = &'a Layer>, background: [u8; 3]) -> [u8; 3] {
+    let (mut left, mut sums) = (65_536_u64, [32_768_u64; 3]);
+    let mut add = |weight: u64, color: [u8; 3]| (0..3).for_each(|c| sums[c] += weight * u64::from(color[c]));
+    for layer in layers {
+        let coverage = u64::from(layer.coverage);
+        let opacity = if coverage < 128 { coverage } else { coverage + 1 };
+        let behind = left * (256 - opacity) / 256;
+        add(left - behind, layer.color);
+        left = behind;
+        if left == 0 {
+            break;
+        }
+    }
+    add(left, background);
+    sums.map(|sum| (sum / 65_536) as u8)
+}
+
+/// What `fly` shows at pixel `(i, j)`, if it covers it.
+fn layer_at(fly: &Fly, key: u64, masks: &MaskSet, i: i64, j: i64) -> Option<Layer> {
     let (cos, sin) = cos_sin(fly.angle);
     let (dx, dy) = (i * 64 - i64::from(fly.x), j * 64 - i64::from(fly.y));
     let u = dx * i64::from(cos) + dy * i64::from(sin);
@@ -84,6 +117,7 @@ fn color_at(fly: &Fly, masks: &MaskSet, i: i64, j: i64) -> Option<[u8; 3]> {
     let texel = masks.layers()[usize::from(fly.mask)].texels()[row as usize * MASK_SIDE + column as usize];
     let rounded = |channel: u16| (f64::from(channel) * 255.0 / 65535.0).round() as u64;
     let shade = |channel: u64| ((channel * u64::from(texel.shade) + 127) / 255) as u8;
-    let shaded = [fly.r, fly.g, fly.b].map(|channel| shade(rounded(channel)));
-    (texel.coverage >= COVERAGE_THRESHOLD).then_some(shaded)
+    let color = [fly.r, fly.g, fly.b].map(|channel| shade(rounded(channel)));
+    let least = if masks.blend() == Blend::Opaque { COVERAGE_THRESHOLD } else { 1 };
+    (texel.coverage >= least).then_some(Layer { key, color, coverage: texel.coverage })
 }

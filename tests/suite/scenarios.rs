@@ -6,7 +6,7 @@ use rand::RngExt;
 use smalti::model::fly::{SIDE_MAX, SIDE_MIN, Z_MAX, position_max};
 use smalti::model::mask::{MASK_SIDE, Mask, MaskSet, Texel};
 use smalti::model::rng::{Purpose, Stream};
-use smalti::model::{Fly, Scene, Target};
+use smalti::model::{Blend, Fly, Scene, Target};
 
 /// A scene with a population, and a name for messages.
 pub struct Scenario {
@@ -64,6 +64,57 @@ pub fn holed_masks() -> MaskSet {
     let ring = Mask::new((0..MASK_SIDE * MASK_SIDE).map(texel).collect()).expect("a full layer");
     let nothing = Mask::new(vec![Texel { coverage: 0, shade: 255 }; MASK_SIDE * MASK_SIDE]).expect("a full layer");
     MaskSet::with_layers(vec![ring, nothing]).expect("few layers")
+}
+
+/// Translucent masks: noise in coverage and shade, a soft disc with nothing around it, and the faintest veil.
+pub fn translucent_masks(random: &mut Stream) -> MaskSet {
+    let mut mask = |texel: &mut dyn FnMut(i32, i32, &mut Stream) -> Texel| {
+        let places = (0..MASK_SIDE * MASK_SIDE).map(|index| ((index % MASK_SIDE) as i32, (index / MASK_SIDE) as i32));
+        Mask::new(places.map(|(column, row)| texel(column, row, random)).collect()).expect("a full layer")
+    };
+    let noise = mask(&mut |_, _, random| Texel { coverage: random.random(), shade: random.random() });
+    let disc = mask(&mut |column, row, _| {
+        let distance = (column - 128).pow(2) + (row - 128).pow(2);
+        Texel { coverage: (200 - distance / 60).max(0) as u8, shade: 255 }
+    });
+    let veil = mask(&mut |column, _, _| Texel { coverage: 1, shade: column as u8 });
+    MaskSet::with_layers(vec![noise, disc, veil]).expect("few layers").with_blend(Blend::Translucent)
+}
+
+/// Every scenario once more with translucent masks.
+pub fn translucent_scenarios() -> Vec<Scenario> {
+    let mut random = stream(255);
+    let masks = Arc::new(translucent_masks(&mut random));
+    let mut all = scenarios();
+    for scenario in &mut all {
+        scenario.scene.masks = Arc::clone(&masks);
+        for fly in &mut scenario.flies {
+            fly.mask = random.random_range(0..masks.layers().len() as u16);
+        }
+    }
+    all
+}
+
+/// 20,000 tiles that all cover the whole of a small picture, with `masks`: no pixel may lose a layer.
+pub fn deep_stack(name: &'static str, masks: MaskSet, random: &mut Stream) -> Scenario {
+    let scene = Scene { masks: Arc::new(masks), background: [255, 3, 99], ..random_scene(3, 2, 20_000, random) };
+    let fly = |fly: Fly| Fly { x: 64, y: 32, w: 640, h: 640, mask: 1, ..fly };
+    let flies = flies(&scene, 1.0..2.0, random).into_iter().map(fly).collect();
+    Scenario { name, scene, flies }
+}
+
+/// The two ways to be deep: every layer as faint as can be, and layers from faint to a quarter.
+pub fn deep_stacks() -> [Scenario; 2] {
+    let mut random = stream(20_000);
+    let faint = Mask::new(vec![Texel { coverage: 1, shade: 255 }; MASK_SIDE * MASK_SIDE]).expect("a full layer");
+    let texels = (0..MASK_SIDE * MASK_SIDE)
+        .map(|_| Texel { coverage: random.random_range(0..64) / random.random_range(1..64), shade: random.random() });
+    let mixed = Mask::new(texels.collect()).expect("a full layer");
+    let set = |mask| MaskSet::with_layers(vec![mask]).expect("few layers").with_blend(Blend::Translucent);
+    [
+        deep_stack("20,000 of the faintest tiles", set(faint), &mut random),
+        deep_stack("20,000 tiles of mixed coverage", set(mixed), &mut random),
+    ]
 }
 
 /// All scenarios that both evaluators must answer exactly.

@@ -7,6 +7,7 @@ use crate::app::study::Recipe;
 use crate::error::Result;
 use crate::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE, Texel, shaded};
 use crate::model::operators::Rotation;
+use crate::model::tile::{pack, unpack};
 use crate::model::{Mask, Rgb};
 use crate::photo::Photo;
 use crate::shapes::{BuiltIn, Shader};
@@ -48,9 +49,10 @@ pub(super) fn fig7(bench: &Workbench<'_>) -> Result<Page> {
 
 /// A tile that wears `mask`, opaque and beside it translucent, on dark ground.
 fn sample(mask: &Mask) -> Photo {
-    let opaque = |texel: Texel| if texel.coverage >= COVERAGE_THRESHOLD { shaded(TILE, texel.shade) } else { GROUND };
+    let lit = |texel: Texel| unpack(shaded(pack(TILE), u32::from(texel.shade)));
+    let opaque = |texel: Texel| if texel.coverage >= COVERAGE_THRESHOLD { lit(texel) } else { GROUND };
     let translucent = |texel: Texel| {
-        let color = shaded(TILE, texel.shade);
+        let color = lit(texel);
         let mix = |k: usize| {
             let parts = u32::from(color[k]) * u32::from(texel.coverage)
                 + u32::from(GROUND[k]) * u32::from(255 - texel.coverage);

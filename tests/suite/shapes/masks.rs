@@ -71,7 +71,7 @@ fn no_mask_is_so_dark_that_a_light_colour_is_out_of_reach() {
         let mask = mask(shape, shader);
         let (mut sum, mut weight) = (0_u64, 0_u64);
         for texel in mask.texels() {
-            sum += u64::from(texel.coverage) * u64::from(shaded([255; 3], texel.shade)[0]);
+            sum += u64::from(texel.coverage) * u64::from(shaded(255, u32::from(texel.shade)));
             weight += u64::from(texel.coverage);
         }
         assert!(sum / weight >= 150, "{shape} in {shader} has a mean shade of {}", sum / weight);

@@ -1,0 +1,343 @@
+//! The compute pass `translucent`: lanes whose tiles show what lies behind them. Twin: `cpu/translucent.rs`.
+//!
+//! The device answers with what each block adds to the sums; the host keeps the sums. Nothing is capped: a block's
+//! scratch holds as many layers as its pixels can have, work that exceeds the buffers takes several submissions, and
+//! blocks with long lists or deep stacks take several dispatches.
+
+use std::sync::Arc;
+
+use super::evaluate_pass::{EvaluatePass, KernelShape, LIST_PIECE};
+use super::layout::{FLAG_CONTINUED, FLAG_UNFINISHED, StackItem, TranslucentPush};
+use super::shaders;
+use crate::error::Result;
+use crate::model::blocks::index_of;
+use crate::model::tally::{BlockParts, Tally};
+use crate::model::translucency::LAYERS_MAX;
+use crate::model::{Evaluation, Lane};
+use crate::vk::{
+    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePipeline, ComputeShader, Device, DeviceKind,
+    ReadTicket, Recorder, Residence,
+};
+
+/// Layers that the kernel leaves out side by side.
+const CHUNK: usize = 4;
+/// Words of scratch per pixel before its layers, and per layer.
+const STATE_WORDS: usize = 3;
+const LAYER_WORDS: usize = 2;
+/// Most turns of all loops of one invocation in one dispatch. Software Vulkan ends them silently after 65,535, counted
+/// over nested loops together (Mesa 22.3.6, llvmpipe).
+const TURNS_PER_DISPATCH: usize = 60_000;
+/// Turns of all items of a submission: a fraction of a watchdog's second, at some 50 ns each.
+const TURNS_PER_SUBMISSION: usize = 1 << 22;
+/// Words of scratch for ordinary work.
+const SCRATCH_WORDS: usize = 1 << 23;
+
+/// Fitness of one lane, kept by the host.
+struct Ledger {
+    tally: Tally,
+    blocks: Vec<BlockParts>,
+}
+
+/// A block of the batch: where its parts will be.
+struct BatchBlock {
+    lane: usize,
+    block: u32,
+    entries: std::ops::Range<usize>,
+    first_part: usize,
+}
+
+/// Work of the next submission.
+#[derive(Default)]
+struct Batch {
+    blocks: Vec<BatchBlock>,
+    /// The k-th dispatch works on the k-th item of every block that has so many, each with the turns of its loops.
+    rounds: Vec<Vec<(StackItem, usize)>>,
+    item_count: usize,
+    entries: Vec<u32>,
+    scratch_words: usize,
+    part_count: usize,
+}
+
+/// Pipeline, buffers and sums of the translucent lanes.
+pub(super) struct TranslucentPass {
+    pixels_per_thread: usize,
+    block_pixels: usize,
+    ledgers: Vec<Ledger>,
+    batch: Batch,
+    work: Arc<Buffer>,
+    entries: Arc<Buffer>,
+    scratch: Arc<Buffer>,
+    parts: Arc<Buffer>,
+    pipeline: Arc<ComputePipeline>,
+    group: Arc<BindingGroup>,
+    workgroups_per_row: usize,
+}
+
+impl TranslucentPass {
+    /// Creates the pass for lanes whose shared data are in `shared`.
+    pub fn create(device: &Arc<Device>, shared: &EvaluatePass, lanes: &[Lane]) -> Result<Self> {
+        let pixels_per_thread = pixels_per_thread(device.info().kind);
+        let shape = KernelShape { pixels_per_thread: pixels_per_thread as u32, ..shared.variant.shape };
+        let block_pixels = shared.variant.shape.block_pixels();
+        let block_count: usize = lanes.iter().map(|lane| lane.lists().block_count()).sum();
+        let fly_count = lanes.iter().map(|lane| lane.tiles().len()).max().unwrap_or(0);
+        // Whatever a population does, a block fits: then nothing is ever refused.
+        let entry_count = (24 * block_count).clamp(1 << 16, 1 << 22).max(fly_count + 1);
+        let item_count = block_count.max(8_192);
+        let scratch_words = SCRATCH_WORDS.max(scratch_words(fly_count, block_pixels));
+        let storage = |name: &str, words: usize| {
+            Buffer::create(device, name, words as u64 * 4, BufferUse::Storage, Residence::Device)
+        };
+        let work = storage("translucent work", item_count * size_of::<StackItem>() / 4)?;
+        let entries = storage("translucent entries", entry_count)?;
+        let scratch = storage("translucent scratch", scratch_words)?;
+        let parts = storage("translucent parts", entry_count + block_count)?;
+        let pipeline = create_pipeline(device, shape)?;
+        let group = {
+            let EvaluatePass { lanes, tiles, targets, top, under, masks, .. } = shared;
+            let buffers = [lanes, &work, &entries, tiles, targets, top, under, &scratch, &parts, masks];
+            let bindings = buffers.map(Binding::Buffer);
+            BindingGroup::create("translucent", pipeline.layout(), &bindings)?
+        };
+        let ledger = |lane: &Lane| Ledger {
+            tally: Tally::new(lane.tiles().len()),
+            blocks: vec![BlockParts::default(); lane.lists().block_count()],
+        };
+        Ok(Self {
+            pixels_per_thread,
+            block_pixels,
+            ledgers: lanes.iter().map(ledger).collect(),
+            batch: Batch::default(),
+            work,
+            entries,
+            scratch,
+            parts,
+            pipeline,
+            group,
+            workgroups_per_row: device.info().limits.workgroups[0] as usize,
+        })
+    }
+
+    /// Fitness of a translucent lane.
+    pub fn evaluation(&self, lane: usize) -> Evaluation<'_> {
+        self.ledgers[lane].tally.evaluation()
+    }
+
+    /// Whether a block with a list of `length` still fits the buffers together with the batch so far. An empty batch has
+    /// room for any block.
+    pub fn has_room(&self, length: usize) -> bool {
+        let words = |buffer: &Buffer| buffer.size_bytes() as usize / 4;
+        let batch = &self.batch;
+        let item_capacity = self.work.size_bytes() as usize / size_of::<StackItem>();
+        batch.blocks.is_empty()
+            || (batch.entries.len() + length <= words(&self.entries)
+                && batch.part_count + length < words(&self.parts)
+                && batch.scratch_words + scratch_words(length, self.block_pixels) <= words(&self.scratch)
+                && batch.item_count + plan(length, self.pixels_per_thread).len() <= item_capacity)
+    }
+
+    /// Adds the evaluation of a block, whose first pixel has the number `first_pixel` in the layers, to the batch.
+    pub fn add(&mut self, lane_number: usize, lane: &Lane, block: u32, first_pixel: usize) {
+        let lists = lane.lists();
+        let (x, y) = lists.origin(block as usize);
+        let origin = (x as i32, y as i32);
+        let flies = lists.list(block as usize).iter().map(|&key| index_of(key));
+        let batch = &mut self.batch;
+        let first_entry = batch.entries.len();
+        let side = lists.side_px() as i32;
+        batch.entries.extend(flies.filter(|&fly| lane.tiles()[fly as usize].may_cover(origin, side)));
+        let length = batch.entries.len() - first_entry;
+        let plan = plan(length, self.pixels_per_thread);
+        let last = plan.len() - 1;
+        for (round, step) in plan.into_iter().enumerate() {
+            if batch.rounds.len() == round {
+                batch.rounds.push(Vec::new());
+            }
+            let item = StackItem {
+                lane: lane_number as u32,
+                first_pixel: first_pixel as u32,
+                x: origin.0,
+                y: origin.1,
+                first_entry: (first_entry + step.entries.start) as u32,
+                entry_count: step.entries.len() as u32,
+                first_slot: step.entries.start as u32,
+                flags: if round > 0 { FLAG_CONTINUED } else { 0 } | if round < last { FLAG_UNFINISHED } else { 0 },
+                first_rank: step.ranks.start as u32,
+                end_rank: step.ranks.end as u32,
+                scratch: batch.scratch_words as u32,
+                first_part: batch.part_count as u32,
+                error: (batch.part_count + length) as u32,
+            };
+            batch.rounds[round].push((item, step.turns));
+            batch.item_count += 1;
+        }
+        let entries = first_entry..batch.entries.len();
+        batch.blocks.push(BatchBlock { lane: lane_number, block, entries, first_part: batch.part_count });
+        batch.scratch_words += scratch_words(length, self.block_pixels);
+        batch.part_count += length + 1;
+    }
+
+    /// Records the batch, submitting in between if it is much work, and asks for its parts.
+    pub fn record(&self, recorder: &mut Recorder) -> Result<Option<ReadTicket>> {
+        let batch = &self.batch;
+        if batch.blocks.is_empty() {
+            return Ok(None);
+        }
+        let items: Vec<StackItem> = batch.rounds.iter().flatten().map(|(item, _)| *item).collect();
+        recorder.write_buffer(&self.work, 0, bytemuck::cast_slice(&items))?;
+        recorder.write_buffer(&self.entries, 0, bytemuck::cast_slice(&batch.entries))?;
+        let part_bytes = batch.part_count as u64 * 4;
+        recorder.transfer_pass("zero parts")?.fill(&self.parts, 0, part_bytes, 0);
+        let (mut first, mut turns) = (0, 0);
+        for round in &batch.rounds {
+            let mut end = first;
+            for &(_, item_turns) in round {
+                if turns + item_turns > TURNS_PER_SUBMISSION {
+                    self.dispatch(recorder, first..end)?;
+                    recorder.submit_and_wait()?;
+                    (first, turns) = (end, 0);
+                }
+                turns += item_turns;
+                end += 1;
+            }
+            self.dispatch(recorder, first..end)?;
+            first = end;
+        }
+        recorder.read_buffer(&self.parts, 0, part_bytes).map(Some)
+    }
+
+    /// Takes the parts of the batch that [`TranslucentPass::record`] asked for into the sums, and empties it.
+    pub fn absorb(&mut self, recorder: &Recorder, ticket: &ReadTicket) -> Result<()> {
+        let mut parts = vec![0_i32; self.batch.part_count];
+        recorder.read_into(ticket, bytemuck::cast_slice_mut(&mut parts))?;
+        for BatchBlock { lane, block, entries, first_part } in &self.batch.blocks {
+            let (marginal, error) = parts[*first_part..].split_at(entries.len());
+            let Ledger { tally, blocks } = &mut self.ledgers[*lane];
+            let sums = &mut blocks[*block as usize];
+            tally.subtract(sums);
+            sums.set(self.batch.entries[entries.clone()].iter().copied(), marginal, error[0] as u32);
+            tally.add(sums);
+        }
+        self.batch.clear();
+        Ok(())
+    }
+
+    /// Records a dispatch of some items of the batch, after what was recorded before it.
+    fn dispatch(&self, recorder: &mut Recorder, items: std::ops::Range<usize>) -> Result<()> {
+        if items.is_empty() {
+            return Ok(());
+        }
+        let mut pass = recorder.compute_pass("translucent")?;
+        pass.bind(&self.pipeline, &self.group);
+        let push = TranslucentPush { first_item: items.start as u32, item_count: items.len() as u32 };
+        pass.push_constants(bytemuck::bytes_of(&push));
+        let columns = items.len().min(self.workgroups_per_row);
+        pass.dispatch(columns as u32, items.len().div_ceil(columns) as u32, 1);
+        Ok(())
+    }
+}
+
+impl Batch {
+    fn clear(&mut self) {
+        self.blocks.clear();
+        self.rounds.iter_mut().for_each(Vec::clear);
+        self.item_count = 0;
+        self.entries.clear();
+        self.scratch_words = 0;
+        self.part_count = 0;
+    }
+}
+
+/// What one dispatch does for a block.
+#[derive(Debug, PartialEq, Eq)]
+struct Step {
+    /// Entries of the list to collect.
+    entries: std::ops::Range<usize>,
+    /// Layers to leave out.
+    ranks: std::ops::Range<usize>,
+    /// Most turns of the loops of one invocation.
+    turns: usize,
+}
+
+/// How to evaluate a block with a list of `length` so that no invocation turns its loops too often.
+fn plan(length: usize, pixels_per_thread: usize) -> Vec<Step> {
+    let depth = length.min(LAYERS_MAX);
+    let mut steps = Vec::new();
+    let mut from = 0;
+    while length - from > LIST_PIECE {
+        steps.push(Step { entries: from..from + LIST_PIECE, ranks: 0..0, turns: LIST_PIECE });
+        from += LIST_PIECE;
+    }
+    let mut entries = from..length;
+    let mut rank = 0;
+    loop {
+        // Each pixel composites all of its layers once.
+        let mut turns = entries.len() + pixels_per_thread * (depth + 1);
+        let first = rank;
+        while rank < depth {
+            let more = pixels_per_thread * (depth.saturating_sub(rank + CHUNK) + 2);
+            if rank > first && turns + more > TURNS_PER_DISPATCH {
+                break;
+            }
+            turns += more;
+            rank += CHUNK;
+        }
+        // A block without tiles still has an error.
+        steps.push(Step { entries, ranks: first..rank.max(1), turns });
+        if rank >= depth {
+            return steps;
+        }
+        entries = length..length;
+    }
+}
+
+/// Words of scratch for a block with a list of `length`.
+fn scratch_words(length: usize, block_pixels: usize) -> usize {
+    (STATE_WORDS + LAYER_WORDS * length.min(LAYERS_MAX)) * block_pixels
+}
+
+/// Pixels of one column that an invocation works on.
+fn pixels_per_thread(kind: DeviceKind) -> usize {
+    match kind {
+        DeviceKind::Cpu => 8,
+        _ => 1,
+    }
+}
+
+fn create_pipeline(device: &Arc<Device>, shape: KernelShape) -> Result<Arc<ComputePipeline>> {
+    ComputePipeline::create(
+        device,
+        &ComputeShader {
+            name: "translucent",
+            spirv: &shaders::words(shaders::TRANSLUCENT),
+            specialization: &shape.specialization(),
+            bindings: &[BindingKind::StorageBuffer; 10],
+            push_constant_bytes: size_of::<TranslucentPush>() as u32,
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_cover_every_entry_and_layer_once_and_never_turn_too_often() {
+        for pixels_per_thread in [1, 2, 4, 8] {
+            for length in [0, 1, 3, 4, 5, 100, 700, 1_566, 1_567, LIST_PIECE, LIST_PIECE + 1, 1_000_000] {
+                let steps = plan(length, pixels_per_thread);
+                let (mut entry, mut rank) = (0, 0);
+                for step in &steps {
+                    assert!(step.turns <= TURNS_PER_DISPATCH, "{length}: {step:?}");
+                    assert_eq!(step.entries.start, if step.entries.is_empty() { length } else { entry });
+                    entry = step.entries.end;
+                    if !step.ranks.is_empty() {
+                        assert!(step.ranks.start == rank && rank % CHUNK == 0 && entry == length);
+                        rank = step.ranks.end;
+                    }
+                }
+                assert!(entry == length && rank >= length.clamp(1, LAYERS_MAX), "{length}: {steps:?}");
+            }
+        }
+    }
+}
