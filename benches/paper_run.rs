@@ -9,7 +9,7 @@ use smalti::engine::{Engine, Undisturbed};
 use smalti::error::Result;
 use smalti::evolve::{Evolution, PaperScheme};
 use smalti::gpu::GpuEvaluator;
-use smalti::model::{Canvas, Change, Evaluation, Evaluator, Fly, Layers, Mosaic, Population, Scene};
+use smalti::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population};
 
 /// An evaluator that evaluates the whole picture after every generation: what incremental refresh is compared with.
 struct FullRefresh {
@@ -18,8 +18,8 @@ struct FullRefresh {
 }
 
 impl Evaluator for FullRefresh {
-    fn scene(&self, lane: usize) -> &Scene {
-        self.inner.scene(lane)
+    fn lane(&self, lane: usize) -> &Lane {
+        self.inner.lane(lane)
     }
     fn lane_count(&self) -> usize {
         self.inner.lane_count()

@@ -67,6 +67,9 @@ pub enum Error {
     /// The validation layer complained (only with `--validate`).
     #[error("Vulkan validation: {0}")]
     Validation(String),
+    /// Somebody asked for the end before the work was done.
+    #[error("interrupted; run the same command again")]
+    Interrupted,
     /// The engine contradicts itself: a bug.
     #[error("internal error: {0}; please report it with the command that led to it")]
     Internal(String),
@@ -90,7 +93,7 @@ impl Error {
         match self {
             Self::Usage(_) | Self::Input { .. } | Self::TooLarge(_) => 2,
             Self::NoSuitableDevice { .. } => 4,
-            Self::DeviceLost { .. } => 75,
+            Self::DeviceLost { .. } | Self::Interrupted => 75,
             Self::Output { .. }
             | Self::OutOfDeviceMemory { .. }
             | Self::Vulkan { .. }

@@ -12,10 +12,13 @@ pub mod engine;
 pub mod error;
 pub mod evolve;
 pub mod gpu;
+pub mod metrics;
 pub mod model;
 pub mod openraster;
 pub mod output;
 pub mod photo;
+pub mod plot;
+pub mod shapes;
 pub mod vector;
 pub mod vk;
 

@@ -20,20 +20,93 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Output`] if the folder is missing or may not be written, the disk is full, or `path` is a folder.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    write(path, bytes, Durability::OnDisk)
+}
+
+/// As [`write_atomically`], but leaves it to the system when the bytes reach the disk: for files that come by the
+/// hundred and can be made again. A crash of the system, though not of the program, may leave an empty file.
+///
+/// # Errors
+/// [`Error::Output`], as from [`write_atomically`].
+pub fn write_atomically_soon(path: &Path, bytes: &[u8]) -> Result<()> {
+    write(path, bytes, Durability::Soon)
+}
+
+/// When a file is on the disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Durability {
+    /// Before its writer goes on.
+    OnDisk,
+    /// When the system likes.
+    Soon,
+}
+
+fn write(path: &Path, bytes: &[u8], durability: Durability) -> Result<()> {
     let write = || match Place::of(path)? {
         Place::Stream => File::options().write(true).open(path)?.write_all(bytes),
         Place::File { target, old } => {
             let mut file = create_beside(&target)?;
             file.write_all(bytes)?;
-            if let Some(old) = old {
-                file.as_file().set_permissions(old.permissions())?;
-            }
-            file.as_file().sync_all()?;
-            file.persist(&target)?;
-            Ok(())
+            persist(file, &target, old.as_ref(), durability)
         }
     };
     write().map_err(|error| output_error(path, &error))
+}
+
+/// A file that grows beside its target, and takes its name only when it is whole. Dropped before that, it goes away.
+#[derive(Debug)]
+pub struct PartialFile {
+    /// The target, as the user wrote it.
+    path: PathBuf,
+    target: PathBuf,
+    old: Option<Metadata>,
+    file: NamedTempFile,
+}
+
+impl PartialFile {
+    /// An empty file for `path`.
+    ///
+    /// # Errors
+    /// [`Error::Output`], as from [`write_atomically`], and if `path` is a device or a pipe.
+    pub fn create(path: &Path) -> Result<Self> {
+        let create = || match Place::of(path)? {
+            Place::Stream => Err(io::Error::other("it is a device or a pipe")),
+            Place::File { target, old } => {
+                let file = create_beside(&target)?;
+                Ok(Self { path: path.to_owned(), target, old, file })
+            }
+        };
+        create().map_err(|error| output_error(path, &error))
+    }
+
+    /// A handle to write with.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if the process can hold no more files open.
+    pub fn writer(&self) -> Result<File> {
+        self.file.as_file().try_clone().map_err(|error| output_error(&self.path, &error))
+    }
+
+    /// Where the file is while it grows, for other programs to write to.
+    #[must_use]
+    pub fn growing_path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// The failure that [`write_atomically`] would give for `error`.
+    #[must_use]
+    pub fn failure(&self, error: &io::Error) -> Error {
+        output_error(&self.path, error)
+    }
+
+    /// Gives the file the name of its target, in one step.
+    ///
+    /// # Errors
+    /// [`Error::Output`], as from [`write_atomically`].
+    pub fn commit(self) -> Result<()> {
+        let Self { path, target, old, file } = self;
+        persist(file, &target, old.as_ref(), Durability::OnDisk).map_err(|error| output_error(&path, &error))
+    }
 }
 
 /// Whether [`write_atomically`] could write to `path` now, found out without leaving anything behind.
@@ -94,6 +167,18 @@ fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(folder)
+}
+
+/// Gives a temporary file the name of its target, and the permissions of the file that it replaces.
+fn persist(file: NamedTempFile, target: &Path, old: Option<&Metadata>, durability: Durability) -> io::Result<()> {
+    if let Some(old) = old {
+        file.as_file().set_permissions(old.permissions())?;
+    }
+    if durability == Durability::OnDisk {
+        file.as_file().sync_all()?;
+    }
+    file.persist(target)?;
+    Ok(())
 }
 
 fn output_error(path: &Path, error: &io::Error) -> Error {

@@ -7,7 +7,15 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::gallery::GalleryArgs;
+use super::look::LookArgs;
+use super::paper::PaperArgs;
+use super::presets::{self, Preset};
 use super::render::RenderArgs;
+use super::scheme::SchemeArgs;
+use super::score::ScoreArgs;
+use super::timelapse::TimelapseArgs;
+use super::values::ColorCount;
 use super::{report, values};
 use crate::model::Rgb;
 
@@ -17,8 +25,8 @@ use crate::model::Rgb;
     name = "smalti",
     version,
     about = "Evolves pictures into mosaics of thousands of tiles.",
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage or unreadable input, 4 no suitable device,\n\
-                  75 interrupted or device lost (run the same command again), 130 second Ctrl-C."
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage or unreadable input, 3 some items failed,\n\
+                  4 no suitable device, 75 interrupted or device lost (run the same command again), 130 second Ctrl-C."
 )]
 pub struct Cli {
     /// What to do.
@@ -66,8 +74,22 @@ pub(super) enum Command {
     ///
     /// At the size at which it evolved the picture is the one that `evolve` wrote.
     Render(Box<RenderArgs>),
+    /// Make the figures and tables of the paper from your own pictures
+    ///
+    /// Each is a page with its pictures, plots and tables, to be opened from disk.
+    Paper(PaperArgs),
+    /// Show every mask and every shader on the same pictures
+    Gallery(GalleryArgs),
+    /// Turn the snapshots of an evolution into an animation
+    /// Draws what `smalti evolve --save-run DIR` kept, in order and at any size.
+    Timelapse(Box<TimelapseArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
+    /// Measure how much pictures are like a reference
+    ///
+    /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed with
+    /// numpy, scipy and scikit-image. Of an animation the first frame is measured.
+    Score(ScoreArgs),
 }
 
 const EVOLVE_EXAMPLES: &str = "\
@@ -95,6 +117,15 @@ pub(super) struct EvolveArgs {
     /// Also write the picture that was evolved towards, fitted to size, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
+    /// Also write how the error fell, birth by birth, as a table (.csv) or a plot (.svg); may repeat
+    #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
+    pub curves: Vec<PathBuf>,
+    /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub save_run: Option<PathBuf>,
+    /// Births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 100th of all]
+    #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
+    pub save_every: Option<u64>,
     /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -108,9 +139,15 @@ pub(super) struct EvolveArgs {
     /// Number of tiles, 1 to 1,000,000 (suffixes k, M) [default: 2500 * sqrt(width * height) / 256, rounded]
     #[arg(short = 'n', long, value_name = "N", value_parser = values::count, help_heading = "Picture")]
     pub tiles: Option<u64>,
-    /// Longer side that the picture is reduced to before it is evolved, 1 to 65,535 px; never enlarged
-    #[arg(long, value_name = "PX", value_parser = values::count, default_value = "512", help_heading = "Picture")]
-    pub size: u64,
+    /// Longer side that the picture is reduced to before it is evolved, 1 to 65,535 px; never enlarged [default: 512]
+    #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
+    pub size: Option<u64>,
+    /// Colours that the picture is reduced to before it is evolved: full, or 1 to 256 [default: full]
+    #[arg(long, value_name = "K", value_parser = values::color_count, help_heading = "Picture", conflicts_with = "palette")]
+    pub colors: Option<ColorCount>,
+    /// Palette that picture and tiles are held to: .gpl, .pal, .hex (lines of RRGGBB), or the colours of a picture
+    #[arg(long, value_name = "FILE", help_heading = "Picture")]
+    pub palette: Option<PathBuf>,
     /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: black, or as in --init]
     #[arg(long, value_name = "COLOR", value_parser = values::color, help_heading = "Picture")]
     pub background: Option<Rgb>,
@@ -118,18 +155,27 @@ pub(super) struct EvolveArgs {
     #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]
     pub init: Option<PathBuf>,
 
+    #[command(flatten)]
+    pub look: LookArgs,
+    /// Masks that all tiles change to at the first restart [default: none, or as in --preset]
+    #[arg(long = "restart-mask", value_name = "NAME|FILE", value_delimiter = ',', help_heading = "Tiles")]
+    pub restart_masks: Vec<PathBuf>,
+
+    /// One of the paper's 12 schemes (Table 1), paper-1 to paper-12; other options change parts of it
+    #[arg(long, value_name = "NAME", value_parser = presets::parse, help_heading = "Evolution")]
+    pub preset: Option<Preset>,
     /// How to evolve; `paper` is the published Fly algorithm
     #[arg(long, value_enum, value_name = "NAME", default_value = "paper", help_heading = "Evolution")]
     pub scheme: SchemeName,
-    /// Births of each run (suffixes k, M)
-    #[arg(long, value_name = "B", value_parser = values::count, default_value = "40k", help_heading = "Evolution")]
-    pub births: u64,
+    /// Births of each run (suffixes k, M) [default: 40k]
+    #[arg(long, value_name = "B", value_parser = values::count, help_heading = "Evolution")]
+    pub births: Option<u64>,
     /// Births evaluated together, 1 to N; more is faster on a GPU, 1 is the published algorithm
     #[arg(long, value_name = "K", value_parser = values::count, default_value = "1", help_heading = "Evolution")]
     pub batch_births: u64,
-    /// Further runs, each from the best population so far, 0 to 1,000,000
-    #[arg(long, value_name = "R", value_parser = values::count, default_value = "0", help_heading = "Evolution")]
-    pub restarts: u64,
+    /// Further runs, each from the best population so far, 0 to 1,000,000 [default: 0, or as in --preset]
+    #[arg(long, value_name = "R", value_parser = values::count, help_heading = "Evolution")]
+    pub restarts: Option<u64>,
     /// Factor of all mutation steps at each restart, 0.00001 to 1
     #[arg(long, value_name = "F", default_value_t = 1.0, help_heading = "Evolution")]
     pub cool: f64,
@@ -148,6 +194,8 @@ pub(super) struct EvolveArgs {
     /// Number that decides every random choice
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Evolution")]
     pub seed: u64,
+    #[command(flatten)]
+    pub variation: SchemeArgs,
 
     /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
     #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]

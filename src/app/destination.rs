@@ -219,7 +219,7 @@ fn stdout_is_closed() -> bool {
 }
 
 /// One name for one file, however it was written.
-fn place_of(path: &Path) -> PathBuf {
+pub(super) fn place_of(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     path.canonicalize()
         .or_else(|_| Ok(folder.canonicalize()?.join(path.file_name().unwrap_or_default())))

@@ -84,24 +84,16 @@ impl Selected {
         }
     }
 
-    /// What somebody should know who left the choice to the program.
-    pub(super) fn note(&self) -> Option<String> {
-        match self {
-            Self::Cpu { reason: Some(reason) } => Some(format!("computing on the CPU, since {reason}")),
-            _ => None,
-        }
-    }
-
     /// An evaluator with one lane per scene on this device.
     ///
     /// # Errors
     /// If the device has no room for the scenes.
-    pub(super) fn open(self, scenes: Vec<Scene>) -> Result<Opened> {
+    pub(super) fn open(&self, scenes: Vec<Scene>) -> Result<Opened> {
         match self {
             Self::Cpu { .. } => Ok(Opened { evaluator: Box::new(CpuEvaluator::new(scenes)), validation_log: None }),
             Self::Vulkan { device, validation_log } => {
-                let evaluator = Box::new(GpuEvaluator::create(&device, scenes)?);
-                Ok(Opened { evaluator, validation_log: Some(validation_log) })
+                let evaluator = Box::new(GpuEvaluator::create(device, scenes)?);
+                Ok(Opened { evaluator, validation_log: Some(Arc::clone(validation_log)) })
             }
         }
     }

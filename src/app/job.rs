@@ -3,13 +3,14 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::look::Dress;
 use super::memory;
-use super::options::EvolveOptions;
+use super::options::{Colors, EvolveOptions};
 use crate::archive;
 use crate::error::{Error, Result};
-use crate::evolve::evolution::random_population;
+use crate::evolve::{Palette, PaperScheme, begin_from, first_population};
 use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
-use crate::photo::{self, Loaded, ReadOptions};
+use crate::photo::{self, Loaded, Photo, ReadOptions};
 
 /// The inputs of one evolution, read and fitted together.
 #[derive(Debug)]
@@ -23,6 +24,12 @@ pub(super) struct Job {
     pub warnings: Vec<String>,
     pub background: Rgb,
     pub fly_count: usize,
+    /// The scheme with what depends on files: the masks that flies wear, and the palette of their colours.
+    pub scheme: PaperScheme,
+    /// How many colours the target was reduced to, if it was.
+    pub color_count: Option<usize>,
+    /// The masks that were asked for; none leaves the flies as they are, which is square unless `init` says otherwise.
+    pub dress: Option<Dress>,
     /// The population to begin with, if not a random one.
     pub init: Option<Population>,
 }
@@ -38,8 +45,15 @@ impl Job {
         let of_init = init.as_ref().map(|population| population.background);
         let background = options.background.or(of_init).unwrap_or_default();
         let reading = ReadOptions { background, long_side_px: Some(options.long_side_px) };
-        let Loaded { photo, original_width_px, original_height_px, sha256, warnings } =
+        let Loaded { mut photo, original_width_px, original_height_px, sha256, warnings } =
             photo::read(&options.input, &reading)?;
+        let palette = reduce_colors(&mut photo, &options.colors)?;
+        let dress = dress(options)?;
+        let mut scheme = options.scheme.clone();
+        if let Some(dress) = &dress {
+            scheme.masks.clone_from(&dress.layers_by_run);
+        }
+        scheme.color.palette = palette.map(Palette::new).transpose()?;
         let target = Target::new(photo.width_px, photo.height_px, photo.pixels)?;
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
@@ -55,13 +69,28 @@ impl Job {
             input_sha256: sha256,
             warnings,
             background,
+            scheme,
+            color_count: if let Colors::Few(count) = options.colors { Some(count) } else { None },
+            dress,
             init,
         })
     }
 
     /// The tile shapes that the flies may wear.
     pub(super) fn masks(&self) -> MaskSet {
-        self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone())
+        let of_init = || self.init.as_ref().map_or_else(MaskSet::default, |population| population.masks.clone());
+        self.dress.as_ref().map_or_else(of_init, |dress| dress.masks.clone())
+    }
+
+    /// These flies as a population of this picture.
+    pub(super) fn population(&self, flies: Vec<Fly>) -> Population {
+        Population {
+            width_px: self.target.width_px(),
+            height_px: self.target.height_px(),
+            background: self.background,
+            masks: self.masks(),
+            flies,
+        }
     }
 
     /// The lane that the job becomes.
@@ -75,9 +104,35 @@ impl Job {
     }
 
     /// The flies to begin with.
-    pub(super) fn first_flies(&self, seed: u64) -> Vec<Fly> {
-        let random = || random_population(self.target.width_px(), self.target.height_px(), self.fly_count, seed);
-        self.init.as_ref().map_or_else(random, |population| population.flies.clone())
+    pub(super) fn first_flies(&self) -> Vec<Fly> {
+        let random = || first_population(&self.scheme, &self.target, self.fly_count);
+        self.init.as_ref().map_or_else(random, |population| begin_from(&self.scheme, population.flies.clone()))
+    }
+}
+
+/// The masks that were asked for, unless they are those that flies wear anyway.
+fn dress(options: &EvolveOptions) -> Result<Option<Dress>> {
+    if options.look.is_default() {
+        return Ok(None);
+    }
+    let dress = options.look.dress()?;
+    Ok(if options.init.is_none() && dress.is_plain() { None } else { Some(dress) })
+}
+
+/// Reduces the picture to the colours asked for; returns those that the tiles are held to, too.
+fn reduce_colors(photo: &mut Photo, colors: &Colors) -> Result<Option<Vec<Rgb>>> {
+    match colors {
+        Colors::Full => Ok(None),
+        Colors::Few(count) => {
+            let palette = photo::palette_of(photo, *count)?;
+            photo::reduce(photo, &palette);
+            Ok(None)
+        }
+        Colors::Palette(path) => {
+            let palette = photo::read_palette(path)?;
+            photo::reduce(photo, &palette);
+            Ok(Some(palette))
+        }
     }
 }
 
@@ -101,7 +156,7 @@ fn check_fit(population: &Population, path: &Path, target: &Target) -> Result<()
 }
 
 /// Flies for a picture, so that a fly's share of it grows with its side: 2,500 at 256x256, 5,000 at 512x512 (Table 2).
-fn default_fly_count(width_px: u32, height_px: u32) -> usize {
+pub(super) fn default_fly_count(width_px: u32, height_px: u32) -> usize {
     let pixels = f64::from(width_px) * f64::from(height_px);
     // IEEE 754 fixes the root and the product, so every machine agrees.
     (2500.0 * pixels.sqrt() / 256.0).round() as usize

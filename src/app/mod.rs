@@ -4,20 +4,33 @@
 //! on stderr; stdout carries data only.
 
 mod cli;
+mod curve;
+mod curve_file;
 mod destination;
 mod device;
 mod devices;
+mod gallery;
 mod interrupt;
 mod job;
+mod look;
 mod memory;
 mod options;
 mod outputs;
+mod paper;
+mod presets;
 mod progress;
 mod provenance;
+mod recorder;
 mod render;
 mod report;
 mod result;
 mod run;
+mod scheme;
+mod score;
+mod sheet;
+mod snapshots;
+mod study;
+mod timelapse;
 mod values;
 mod watch;
 
@@ -31,6 +44,10 @@ pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
         cli::Command::Render(args) => render::render(args),
+        cli::Command::Timelapse(args) => timelapse::make(args),
         cli::Command::Devices(args) => devices::list(args),
+        cli::Command::Paper(args) => paper::make(args),
+        cli::Command::Gallery(args) => gallery::make(args),
+        cli::Command::Score(args) => score::score(args),
     }
 }

@@ -4,8 +4,14 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
+use super::curve_file::CurveFile;
 use super::destination::{self, Destination};
+use super::look::Look;
+use super::presets::Preset;
+use super::snapshots::SaveRun;
+use super::values::ColorCount;
 use crate::error::{Error, Result};
+use crate::evolve::scheme::PAPER_BIRTHS;
 use crate::evolve::{OnDry, PaperScheme};
 use crate::model::Rgb;
 use crate::model::population::FLY_COUNT_MAX;
@@ -17,7 +23,7 @@ const RESTARTS_MAX: u64 = 1_000_000;
 /// Least factor of the mutation steps: it is kept in 65,536ths and must not become 0.
 const COOL_MIN: f64 = 0.00001;
 /// Most CPU threads.
-const THREADS_MAX: u64 = 1_024;
+pub(super) const THREADS_MAX: u64 = 1_024;
 
 /// What to do about outputs that exist already and are not what the same command would write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,12 +47,29 @@ pub(super) enum Verbosity {
     Verbose,
 }
 
+/// Which colours the target keeps.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Colors {
+    Full,
+    /// At most so many of its own.
+    Few(usize),
+    /// Those of a palette file, and the tiles too.
+    Palette(PathBuf),
+}
+
+/// Longer side in px that pictures are reduced to.
+const LONG_SIDE_PX: u64 = 512;
+
 /// Everything that `smalti evolve` was asked to do.
 #[derive(Clone, Debug)]
 pub(super) struct EvolveOptions {
     pub input: PathBuf,
     pub outputs: Vec<Destination>,
     pub save_target: Option<Destination>,
+    /// Where the curve of the evolution goes.
+    pub curves: Vec<CurveFile>,
+    /// Where to keep snapshots.
+    pub save_run: Option<SaveRun>,
     /// Longer side of the written picture in px; `None` writes it as evolved.
     pub output_long_side_px: Option<u32>,
     pub overwrite: Overwrite,
@@ -55,6 +78,8 @@ pub(super) struct EvolveOptions {
     pub fly_count: Option<usize>,
     /// Longer side in px that the picture is reduced to.
     pub long_side_px: u32,
+    pub colors: Colors,
+    pub look: Look,
     /// `None` means the one of `init`, else black.
     pub background: Option<Rgb>,
     pub init: Option<PathBuf>,
@@ -74,18 +99,23 @@ impl EvolveOptions {
     /// [`Error::Usage`] that names the flag and what it may be.
     pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
-        let threads = threads(args.threads)?;
+        let threads = thread_count(args.threads)?;
         let validation = if args.validate { Validation::On } else { Validation::Off };
-        let device = device(&args.device, validation)?;
+        let device = watched_device(&args.device, validation)?;
+        let preset_side = args.preset.map(|preset| u64::from(preset.side_px));
         let options = Self {
             input: args.input.clone(),
             outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
             save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
+            curves: args.curves.iter().map(|path| CurveFile::new(path)).collect::<Result<_>>()?,
+            save_run: args.save_run.as_deref().map(|folder| SaveRun::new(folder, args.save_every)).transpose()?,
             output_long_side_px: args.output_size.map(|px| side_px("--output-size", px)).transpose()?,
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
             mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
             fly_count: fly_count.map(|count| count as usize),
-            long_side_px: side_px("--size", args.size)?,
+            long_side_px: side_px("--size", args.size.unwrap_or(preset_side.unwrap_or(LONG_SIDE_PX)))?,
+            colors: colors(args),
+            look: Look::new(&args.look, &args.restart_masks, args.preset)?,
             background: args.background,
             init: args.init.clone(),
             scheme: scheme(args)?,
@@ -96,6 +126,9 @@ impl EvolveOptions {
             progress: progress(args),
             verbosity: verbosity(args),
         };
+        if options.look.changes_at_restart() && options.scheme.restarts == 0 {
+            return Err(Error::Usage("--restart-mask needs a restart; add --restarts".to_owned()));
+        }
         if args.json {
             check_stdout_is_free(&options.outputs)?;
         }
@@ -114,11 +147,6 @@ pub(super) fn side_px(flag: &str, px: u64) -> Result<u32> {
     in_range(flag, px, (1, u64::from(TARGET_SIDE_MAX_PX))).map(|px| px as u32)
 }
 
-/// The value of `--threads`.
-pub(super) fn threads(count: Option<u64>) -> Result<Option<usize>> {
-    count.map(|count| in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize)).transpose()
-}
-
 /// Refuses a picture on the stdout that the row of `--json` goes to.
 pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
     if outputs.iter().any(Destination::is_stdout) {
@@ -128,16 +156,21 @@ pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
 }
 
 /// The device that was asked for; it must be one that can be watched, if it is to be.
-pub(super) fn device(text: &str, validation: Validation) -> Result<DeviceRequest> {
-    let device = device_request(text)?;
+pub(super) fn watched_device(text: &str, validation: Validation) -> Result<DeviceRequest> {
+    let device = device(text)?;
     if validation == Validation::On && device == DeviceRequest::Cpu {
         return Err(Error::Usage("--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned()));
     }
     Ok(device)
 }
 
-/// What the word asks for; none at all, as in an empty SMALTI_DEVICE, asks for nothing.
-fn device_request(text: &str) -> Result<DeviceRequest> {
+/// The number of CPU threads that was asked for, if any.
+pub(super) fn thread_count(asked: Option<u64>) -> Result<Option<usize>> {
+    asked.map(|count| in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize)).transpose()
+}
+
+/// The device that was asked for; no word at all, as in an empty SMALTI_DEVICE, asks for none.
+pub(super) fn device(text: &str) -> Result<DeviceRequest> {
     let text = text.trim();
     if text.is_empty() {
         return Ok(DeviceRequest::Auto);
@@ -149,10 +182,21 @@ fn device_request(text: &str) -> Result<DeviceRequest> {
     text.parse()
 }
 
+fn colors(args: &EvolveArgs) -> Colors {
+    let of_preset = args.preset.and_then(|preset| preset.color_count);
+    match (&args.palette, args.colors) {
+        (Some(path), _) => Colors::Palette(path.clone()),
+        (None, Some(ColorCount::Few(count))) => Colors::Few(count),
+        (None, Some(ColorCount::Full)) => Colors::Full,
+        (None, None) => of_preset.map_or(Colors::Full, Colors::Few),
+    }
+}
+
 fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
     let SchemeName::Paper = args.scheme;
     let batch_births = in_range("--batch-births", args.batch_births, (1, FLY_COUNT_MAX as u64))?;
-    let restarts = in_range("--restarts", args.restarts, (0, RESTARTS_MAX))?;
+    let of_preset = args.preset.map_or(0, |preset| u64::from(preset.restarts()));
+    let restarts = in_range("--restarts", args.restarts.unwrap_or(of_preset), (0, RESTARTS_MAX))?;
     let patience = args.patience.map(|births| in_range("--patience", births, (1, u64::MAX))).transpose()?;
     let cool_q16 = (args.cool * 65_536.0).round();
     if !(COOL_MIN..=1.0).contains(&args.cool) {
@@ -161,9 +205,9 @@ fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
     if cool_q16 < 65_536.0 && restarts == 0 {
         return Err(Error::Usage("--cool changes only the runs after the first; add --restarts".to_owned()));
     }
-    Ok(PaperScheme {
+    let scheme = PaperScheme {
         seed: args.seed,
-        births: args.births,
+        births: args.births.unwrap_or(args.preset.map_or(PAPER_BIRTHS, Preset::births)),
         restarts: restarts as u32,
         cool_q16: cool_q16 as u32,
         on_dry: match args.on_dry {
@@ -174,7 +218,9 @@ fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
         patience,
         target_sae: args.target_sae,
         batch_births: batch_births as u32,
-    })
+        ..PaperScheme::default()
+    };
+    args.variation.apply(scheme, args.init.is_some())
 }
 
 fn progress(args: &EvolveArgs) -> ProgressKind {
@@ -189,6 +235,7 @@ fn verbosity(args: &EvolveArgs) -> Verbosity {
     }
 }
 
+/// `value`, if it lies between the bounds, both included.
 pub(super) fn in_range(flag: &str, value: u64, (least, most): (u64, u64)) -> Result<u64> {
     if (least..=most).contains(&value) {
         Ok(value)

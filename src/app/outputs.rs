@@ -51,7 +51,7 @@ impl View {
 
 /// Samples along each side of a pixel of a picture of `long_side_px` that was evolved at `evolved_px`: one for each
 /// evolved pixel, within the limits, and as many as the largest canvas allows.
-fn usual_supersampling(long_side_px: u32, evolved_px: u32) -> u32 {
+pub(super) fn usual_supersampling(long_side_px: u32, evolved_px: u32) -> u32 {
     let wanted = evolved_px.div_ceil(long_side_px).clamp(SUPERSAMPLING, SUPERSAMPLING_MAX);
     (1..=wanted).rev().find(|factor| long_side_px * factor <= TARGET_SIDE_MAX_PX).unwrap_or(1)
 }

@@ -9,6 +9,18 @@ use serde_json::json;
 use super::cli::ProgressKind;
 use super::report;
 
+/// Where some work stands, in every form that progress takes.
+pub(super) trait Stage {
+    /// Time since the work began.
+    fn elapsed(&self) -> Duration;
+    /// How much is done, 0 to 1.
+    fn share(&self) -> f64;
+    /// For people.
+    fn line(&self) -> String;
+    /// For programs.
+    fn json_line(&self) -> String;
+}
+
 /// Where an evolution stands.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Standing {
@@ -59,8 +71,8 @@ impl Progress {
     }
 
     /// Shows the standing.
-    pub(super) fn show(&mut self, standing: &Standing) {
-        self.next = standing.elapsed + self.form.interval();
+    pub(super) fn show(&mut self, standing: &impl Stage) {
+        self.next = standing.elapsed() + self.form.interval();
         match &self.form {
             Form::Nothing => {}
             Form::Bar(bar) => {
@@ -106,8 +118,13 @@ impl Standing {
         let by_time = self.time_limit.map(|limit| limit.saturating_sub(self.elapsed).as_secs_f64());
         by_births.into_iter().chain(by_time).reduce(f64::min)
     }
+}
 
-    /// How much is done, 0 to 1.
+impl Stage for Standing {
+    fn elapsed(&self) -> Duration {
+        self.elapsed
+    }
+
     fn share(&self) -> f64 {
         let elapsed_s = self.elapsed.as_secs_f64();
         self.eta_s().map_or(0.0, |eta_s| elapsed_s / (elapsed_s + eta_s).max(1e-9))
@@ -147,7 +164,7 @@ fn bar() -> ProgressBar {
 }
 
 /// A time as `8s`, `2m10s` or `3h05m`.
-fn short_time(seconds: f64) -> String {
+pub(super) fn short_time(seconds: f64) -> String {
     let seconds = seconds.ceil() as u64;
     match seconds {
         0..60 => format!("{seconds}s"),

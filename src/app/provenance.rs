@@ -11,18 +11,19 @@ use super::job::Job;
 use super::options::EvolveOptions;
 use super::outputs::Told;
 use super::report::Status;
+use super::scheme;
 use crate::archive;
 use crate::error::Result;
 use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
-use crate::model::{Blend, Population};
+use crate::model::{Blend, MaskSet, Population};
 use crate::openraster;
 use crate::photo::{self, Metadata};
 use crate::vector;
 
 /// The program's name in metadata.
-const SOFTWARE: &str = "smalti";
+pub(super) const SOFTWARE: &str = "smalti";
 /// Keyword of the text chunk or comment that holds the metadata as JSON.
-const KEYWORD: &str = "smalti";
+pub(super) const KEYWORD: &str = "smalti";
 /// What the header of a population file already tells.
 const HEADER_KEYS: [&str; 4] = ["width_px", "height_px", "background", "blend"];
 
@@ -99,28 +100,34 @@ impl Provenances {
 impl Provenance {
     /// What decides a mosaic.
     fn of_mosaic(options: &EvolveOptions, job: &Job, target_sha256: &str, resized_px: Option<u32>) -> Self {
-        let scheme = &options.scheme;
-        Self::new(
-            job,
-            target_sha256,
-            json!({
-                "content": "mosaic",
-                "algorithm": ALGORITHM_VERSION,
-                "tiles": job.fly_count,
-                "init_sha256": job.init.as_ref().map(population_sha256),
-                "scheme": "paper",
-                "seed": scheme.seed,
-                "births_per_run": scheme.births,
-                "batch_births": scheme.batch_births,
-                "restarts": scheme.restarts,
-                "cool_q16": scheme.cool_q16,
-                "on_dry": on_dry_name(scheme.on_dry),
-                "patience": scheme.patience,
-                "target_sae": scheme.target_sae,
-                "time_ms": options.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
-                "output_size_px": resized_px,
-            }),
-        )
+        let scheme = &job.scheme;
+        let mut specific = json!({
+            "content": "mosaic",
+            "algorithm": ALGORITHM_VERSION,
+            "tiles": job.fly_count,
+            "init_sha256": job.init.as_ref().map(population_sha256),
+            "scheme": "paper",
+            "seed": scheme.seed,
+            "births_per_run": scheme.births,
+            "batch_births": scheme.batch_births,
+            "restarts": scheme.restarts,
+            "cool_q16": scheme.cool_q16,
+            "on_dry": on_dry_name(scheme.on_dry),
+            "patience": scheme.patience,
+            "target_sae": scheme.target_sae,
+            "time_ms": options.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
+            "output_size_px": resized_px,
+        });
+        if let Value::Object(specific) = &mut specific {
+            specific.extend(scheme::decisive(scheme));
+            if let Some(dress) = &job.dress {
+                specific.insert("masks_sha256".to_owned(), masks_sha256(&dress.masks).into());
+            }
+            if let Some(count) = job.color_count {
+                specific.insert("colors".to_owned(), count.into());
+            }
+        }
+        Self::new(job, target_sha256, specific)
     }
 
     /// What decides the fitted picture.
@@ -250,15 +257,27 @@ pub(super) fn population_sha256(population: &Population) -> String {
         genes.iter().for_each(|gene| hash.update(gene.to_le_bytes()));
         channels.iter().for_each(|channel| hash.update(channel.to_le_bytes()));
     }
-    for mask in population.masks.layers() {
-        hash.update(bytemuck::cast_slice(mask.texels()));
-    }
-    if population.masks.blend() == Blend::Translucent {
-        hash.update(b"translucent");
-    }
+    hash_masks(&population.masks, &mut hash);
     hexadecimal(&hash.finalize())
 }
 
+/// SHA-256 over the texels of masks and how they are read, whatever file held them.
+fn masks_sha256(masks: &MaskSet) -> String {
+    let mut hash = Sha256::new();
+    hash_masks(masks, &mut hash);
+    hexadecimal(&hash.finalize())
+}
+
+fn hash_masks(masks: &MaskSet, hash: &mut Sha256) {
+    for mask in masks.layers() {
+        hash.update(bytemuck::cast_slice(mask.texels()));
+    }
+    if masks.blend() == Blend::Translucent {
+        hash.update(b"translucent");
+    }
+}
+
+/// Two lower-case digits for each byte.
 pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

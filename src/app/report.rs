@@ -7,12 +7,12 @@ use std::time::Duration;
 use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
+use super::device::Selected;
 use super::interrupt::EXIT_INTERRUPTED;
 use super::job::Job;
 use super::options::{EvolveOptions, Verbosity};
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
-use crate::model::{Mosaic, Target};
 
 /// What became of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -47,6 +47,8 @@ pub(super) struct Row {
     pub objective: Option<u64>,
     /// Peak signal-to-noise ratio in dB; none for a perfect likeness, whose ratio is infinite.
     pub psnr: Option<f64>,
+    /// Index of Clark and Evans of the tiles' positions: 1 is random, less is clustered.
+    pub spread: Option<f64>,
     pub tiles: Option<usize>,
     pub births: u64,
     /// Births of the last run, which is the one that the clock or an interrupt cut.
@@ -82,6 +84,7 @@ impl Row {
             sae: None,
             objective: None,
             psnr: None,
+            spread: None,
             tiles: None,
             births: 0,
             births_in_last_run: 0,
@@ -132,24 +135,6 @@ impl Row {
 /// Milliseconds with three decimals.
 pub(super) fn milliseconds(duration: Duration) -> f64 {
     duration.as_micros() as f64 / 1e3
-}
-
-/// Peak signal-to-noise ratio in dB over all channels; `None` if the pictures are equal.
-pub(super) fn psnr_db(mosaic: &Mosaic, target: &Target) -> Option<f64> {
-    let squares: u64 = differences(mosaic, target).map(|difference| difference.pow(2)).sum();
-    let channel_count = mosaic.pixels.len() as f64 * 3.0;
-    (squares > 0).then(|| 10.0 * (255.0_f64.powi(2) * channel_count / squares as f64).log10())
-}
-
-/// Sum of absolute errors between a mosaic at evaluation size and its target.
-pub(super) fn sum_of_errors(mosaic: &Mosaic, target: &Target) -> u64 {
-    differences(mosaic, target).sum()
-}
-
-/// The absolute difference of each channel of each pixel.
-fn differences(mosaic: &Mosaic, target: &Target) -> impl Iterator<Item = u64> {
-    let pairs = mosaic.pixels.as_flattened().iter().zip(target.pixels().as_flattened());
-    pairs.map(|(&drawn, &wanted)| u64::from(drawn.abs_diff(wanted)))
 }
 
 /// The summary of a finished evolution.
@@ -256,6 +241,13 @@ fn write_whole(bytes: &[u8]) -> io::Result<()> {
 /// Prints a line to stderr; if that fails there is nowhere left to say so.
 pub(super) fn say(line: &str) {
     let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Says that the CPU computes, to those who did not ask for it.
+pub(super) fn say_device(selected: &Selected) {
+    if let Selected::Cpu { reason: Some(reason) } = selected {
+        say(&format!("smalti: computing on the CPU, since {reason}"));
+    }
 }
 
 /// Prints a failure.

@@ -4,8 +4,8 @@ use super::job::Job;
 use super::options::EvolveOptions;
 use super::outputs::{Drawn, EncodedFile, View};
 use super::provenance::{self, Ending, Provenance};
-use super::report;
 use crate::error::{Error, Result};
+use crate::metrics::Difference;
 use crate::model::{Canvas, Evaluator, Population};
 use crate::photo::{self, Photo};
 
@@ -33,15 +33,15 @@ pub(super) fn draw(
     let (scored, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
     let (width_px, height_px) = (population.width_px, population.height_px);
     let mosaic = evaluator.draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
-    let target = &evaluator.scene(0).target;
-    let drawn = report::sum_of_errors(&mosaic, target);
+    let difference = Difference::between(&mosaic.pixels, evaluator.scene(0).target.pixels());
+    let drawn = difference.sae();
     if scored != ending.sae || drawn != ending.sae {
         return Err(Error::Internal(format!(
             "the best population had an SAE of {}, is evaluated to {scored} and drawn with {drawn}",
             ending.sae
         )));
     }
-    let psnr_db = report::psnr_db(&mosaic, target);
+    let psnr_db = difference.psnr_db();
     let view = View::new(width_px, height_px, options.output_long_side_px);
     let picture = view.is_as_evolved().then_some(mosaic);
     let mut drawn = Drawn { population, marginal, view, picture, layers: None };

@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use super::cli::EvolveArgs;
+use super::curve::Curve;
 use super::destination::Destination;
 use super::device::{self, Opened, Selected};
 use super::interrupt::Interrupt;
@@ -11,14 +12,15 @@ use super::job::Job;
 use super::options::{EvolveOptions, Mode, Verbosity};
 use super::progress::Progress;
 use super::provenance::{Ending, Provenances};
+use super::recorder::Recorder;
 use super::report::{self, Row, Status};
 use super::result::Evolved;
-use super::watch::Watch;
-use super::{destination, memory, outputs, result};
+use super::watch::{Watch, Watchers};
+use super::{curve_file, destination, memory, outputs, provenance, result, scheme};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
-use crate::evolve::Evolution;
-use crate::model::{Canvas, Population};
+use crate::evolve::{Evolution, Spread};
+use crate::model::Canvas;
 use crate::vk::ValidationLog;
 
 /// Evolves one picture and reports about it; the exit code of the process.
@@ -44,6 +46,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let mut interrupt = Interrupt::listen()?;
     start_threads(options.threads)?;
     destination::check_writable(options.destinations(), &options.input)?;
+    curve_file::check_writable(&options.curves, options.destinations(), &options.input)?;
     let selected = device::select(&options.device, options.validation)?;
     row.device = Some(selected.label().to_owned());
 
@@ -61,24 +64,46 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     check_replaceable(options, &provenances)?;
     if options.mode == Mode::DryRun {
         row.status = Status::Planned;
-        row.output = options.destinations().map(|destination| destination.path.display().to_string()).collect();
+        let paths = options.destinations().map(|destination| &destination.path);
+        let paths = paths.chain(options.curves.iter().map(|file| &file.path));
+        let paths = paths.chain(options.save_run.iter().map(|save_run| &save_run.folder));
+        row.output = paths.map(|path| path.display().to_string()).collect();
         report::print_plan(row, options, &job, memory_bytes);
         return Ok(());
     }
 
-    let evolved = evolve_job(options, &job, selected, &interrupt, row)?;
+    let mut curve = (!options.curves.is_empty()).then(|| Curve::new(0));
+    let recorder = begin_record(options, &job, &provenances)?;
+    let mut watchers = Watchers { interrupt: &interrupt, recorder };
+    let evolved = evolve_job(options, &job, selected, (&mut watchers, &mut curve), row)?;
+    let recorder = watchers.recorder;
     let began = Instant::now();
     let status = evolved.ending.status;
     let outputs = outputs_to_write(options, &provenances, &evolved.ending);
     let mut files = outputs::encode(&outputs, evolved.drawn, &provenances.told(&evolved.ending))?;
     files.extend(result::encode_target(options, &job, &provenances.target)?);
-    outputs::write(&files, options.overwrite, &mut interrupt, &mut row.output)?;
+    let written = outputs::write(&files, options.overwrite, &mut interrupt, &mut row.output);
+    let curve_written = curve.map_or(Ok(()), |curve| {
+        let told = (&curve, row.id.as_str(), provenances.population.key());
+        curve_file::write(&options.curves, told, &mut interrupt, &mut row.output)
+    });
+    written.and(curve_written)?;
+    // A broken record of the course is no reason to lose its result.
+    row.output.extend(recorder.map(Recorder::outcome).transpose()?);
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {
         report::print_summary(row, options, &job);
     }
     Ok(())
+}
+
+/// Begins to keep snapshots, if they were asked for.
+fn begin_record(options: &EvolveOptions, job: &Job, provenances: &Provenances) -> Result<Option<Recorder>> {
+    let Some(save_run) = &options.save_run else { return Ok(None) };
+    let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
+    let told = provenance::without_header(provenances.population.describe(None));
+    Recorder::begin(save_run, births_planned, job.population(Vec::new()), told).map(Some)
 }
 
 /// Gives the CPU twin as many threads as were asked for.
@@ -92,13 +117,7 @@ pub(super) fn start_threads(count: Option<usize>) -> Result<()> {
 
 /// Checks what depends on the picture's size; returns about how many bytes the work needs.
 fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
-    let batch_births = options.scheme.batch_births as usize;
-    if batch_births > job.fly_count {
-        return Err(Error::Usage(format!(
-            "--batch-births {batch_births}: must be at most the number of tiles, {}",
-            job.fly_count
-        )));
-    }
+    scheme::check_fly_count(options, job)?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let pixel_count = u64::from(width_px) * u64::from(height_px);
     let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
@@ -121,7 +140,12 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
 fn check_replaceable(options: &EvolveOptions, provenances: &Provenances) -> Result<()> {
     let outputs = options.outputs.iter().map(|output| (output, provenances.of_output(output).key()));
     let targets = options.save_target.iter().map(|output| (output, provenances.target.key()));
-    outputs.chain(targets).try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))
+    outputs
+        .chain(targets)
+        .try_for_each(|(output, key)| destination::check_replaceable(output, key, options.overwrite))?;
+    let key = provenances.population.key();
+    options.curves.iter().try_for_each(|file| file.check_replaceable(key, options.overwrite))?;
+    options.save_run.iter().try_for_each(|save_run| save_run.check(key, options.overwrite))
 }
 
 /// The outputs without those that hold a better result of the same command.
@@ -147,38 +171,34 @@ fn say_notes(job: &Job, options: &EvolveOptions, selected: &Selected) {
     for warning in &job.warnings {
         report::say(&format!("smalti: {}: {warning}", options.input.display()));
     }
-    if let Some(note) = selected.note() {
-        report::say(&format!("smalti: {note}"));
-    }
+    report::say_device(selected);
 }
 
-/// Evolves the job and draws its best population; the device is closed before it returns.
+/// Evolves the job, records its curve if one is asked for, and draws its best population; the device is closed before it
+/// returns.
 fn evolve_job(
     options: &EvolveOptions,
     job: &Job,
     selected: Selected,
-    interrupt: &Interrupt,
+    (watchers, curve): (&mut Watchers<'_>, &mut Option<Curve>),
     row: &mut Row,
 ) -> Result<Evolved> {
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
-    let first_flies = job.first_flies(options.scheme.seed);
-    let evolution = Evolution::new(options.scheme.clone(), 0, width_px, height_px, first_flies);
+    let evolution = Evolution::new(job.scheme.clone(), 0, width_px, height_px, job.first_flies());
     let mut engine = Engine::new(evaluator, vec![evolution]);
-    let mut watch = Watch::begin(interrupt, options.time_limit, Progress::new(options.progress));
-    let ran = engine.run(&mut watch);
-    row.evolve_ms = report::milliseconds(watch.finish());
+    let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress));
+    let ran = engine.run(&mut (&mut watch, &mut *curve));
+    if let Some(curve) = curve {
+        curve.finish(engine.evolutions());
+    }
+    row.evolve_ms = report::milliseconds(watch.finish(&engine.evolutions()[0]));
     ran?;
     let evolution = &engine.evolutions()[0];
     row.note_evolution(evolution);
+    row.spread = Spread::of(evolution.best_flies(), width_px, height_px).clark_evans;
     let ending = Ending::of(evolution);
-    let population = Population {
-        width_px,
-        height_px,
-        background: job.background,
-        masks: job.masks(),
-        flies: evolution.best_flies().to_vec(),
-    };
+    let population = job.population(evolution.best_flies().to_vec());
     let evolved = result::draw(engine.evaluator(), options, population, ending)?;
     row.psnr = evolved.psnr_db;
     drop(engine);

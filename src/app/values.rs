@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::model::Rgb;
+use crate::photo::COLOR_COUNT_MAX;
 
 /// A whole number, as `40000`, `40k` or `2M`.
 pub(super) fn count(text: &str) -> Result<u64, String> {
@@ -13,6 +14,26 @@ pub(super) fn count(text: &str) -> Result<u64, String> {
     whole(digits)
         .and_then(|number| number.checked_mul(factor))
         .ok_or_else(|| "expected a whole number such as 500, 40k or 2M".to_owned())
+}
+
+/// How many colours a picture keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum ColorCount {
+    /// All of them.
+    Full,
+    /// At most so many.
+    Few(usize),
+}
+
+/// `full`, or a whole number of colours.
+pub(super) fn color_count(text: &str) -> Result<ColorCount, String> {
+    if text == "full" {
+        return Ok(ColorCount::Full);
+    }
+    match whole(text) {
+        Some(number) if (1..=COLOR_COUNT_MAX as u64).contains(&number) => Ok(ColorCount::Few(number as usize)),
+        _ => Err(format!("expected full or a number of colours from 1 to {COLOR_COUNT_MAX}")),
+    }
 }
 
 /// A duration: seconds, or numbers with the units h, m, s and ms, as `90`, `30s`, `1h30m`.
@@ -73,6 +94,15 @@ mod tests {
         assert_eq!(count("18446744073709551615"), Ok(u64::MAX));
         for text in ["", "k", "-1", "+1", "1.5k", "1kk", "1 k", "18446744073709551616", "18446744073709551615k", "2m"] {
             assert!(count(text).is_err(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn colours_are_full_or_up_to_256() {
+        assert_eq!(color_count("full"), Ok(ColorCount::Full));
+        assert_eq!(color_count("60"), Ok(ColorCount::Few(60)));
+        for text in ["", "0", "257", "-1", "all", "18446744073709551616"] {
+            assert!(color_count(text).is_err(), "{text:?}");
         }
     }
 

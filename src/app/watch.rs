@@ -1,9 +1,11 @@
-//! The observer of an evolution: the clock, the interrupt and the progress, looked at as seldom as will do.
+//! The observer of an evolution: the clock, the interrupt and the progress, looked at as seldom as will do, and the
+//! snapshots of its course.
 
 use std::time::{Duration, Instant};
 
 use super::interrupt::Interrupt;
 use super::progress::{Progress, Standing};
+use super::recorder::Recorder;
 use crate::engine::Observer;
 use crate::evolve::{Evolution, StopReason};
 
@@ -12,10 +14,19 @@ const LOOK_INTERVAL: Duration = Duration::from_millis(2);
 /// Most generations between two looks at the clock.
 const STRIDE_MAX: u32 = 1_024;
 
+/// What watches an evolution besides the clock.
+#[derive(Debug)]
+pub(super) struct Watchers<'a> {
+    pub interrupt: &'a Interrupt,
+    /// Keeps snapshots, if they were asked for.
+    pub recorder: Option<Recorder>,
+}
+
 /// Watches an evolution, and ends it when the time is up or somebody asked for it.
 #[derive(Debug)]
 pub(super) struct Watch<'a> {
     interrupt: &'a Interrupt,
+    recorder: Option<&'a mut Recorder>,
     time_limit: Option<Duration>,
     progress: Progress,
     began: Instant,
@@ -27,9 +38,10 @@ pub(super) struct Watch<'a> {
 
 impl<'a> Watch<'a> {
     /// Begins to watch; the clock runs from now on.
-    pub(super) fn begin(interrupt: &'a Interrupt, time_limit: Option<Duration>, progress: Progress) -> Self {
+    pub(super) fn begin(watchers: &'a mut Watchers<'_>, time_limit: Option<Duration>, progress: Progress) -> Self {
         Self {
-            interrupt,
+            interrupt: watchers.interrupt,
+            recorder: watchers.recorder.as_mut(),
             time_limit,
             progress,
             began: Instant::now(),
@@ -39,8 +51,11 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Ends the progress; returns the time since the beginning.
-    pub(super) fn finish(self) -> Duration {
+    /// Ends the progress and the record of `evolution`, the only one; returns the time since the beginning.
+    pub(super) fn finish(self, evolution: &Evolution) -> Duration {
+        if let Some(recorder) = self.recorder {
+            recorder.finish(evolution);
+        }
         self.progress.finish();
         self.began.elapsed()
     }
@@ -67,7 +82,16 @@ impl<'a> Watch<'a> {
 }
 
 impl Observer for Watch<'_> {
+    fn at_start(&mut self, evolutions: &[Evolution]) {
+        if let (Some(recorder), [evolution]) = (&mut self.recorder, evolutions) {
+            recorder.note(evolution);
+        }
+    }
+
     fn after_generation(&mut self, evolutions: &[Evolution]) -> Option<StopReason> {
+        if let (Some(recorder), [evolution]) = (&mut self.recorder, evolutions) {
+            recorder.note(evolution);
+        }
         if self.interrupt.is_requested() {
             return Some(StopReason::Interrupted);
         }

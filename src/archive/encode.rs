@@ -16,6 +16,16 @@ use crate::model::{Fly, Mask, Population};
 
 /// Deflate level of every member, 1 to 9.
 const LEVEL: i64 = 6;
+/// Deflate level of what is compressed in a snapshot.
+const SNAPSHOT_LEVEL: i64 = 1;
+
+/// What counts more: the size of the file, or the time that it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Thrift {
+    Bytes,
+    /// Genes are nearly random and take most of the time to compress, to save a third of their bytes.
+    Time,
+}
 
 /// The population with the marginal fitness of each fly as a `.npz` file; `meta` goes into its `meta.json`.
 ///
@@ -31,26 +41,46 @@ pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value
             fitness.len()
         )));
     }
+    encode_members(population, Some(fitness), meta, Thrift::Bytes)
+}
+
+/// The population as [`encode`] writes it, without marginal fitness and in less time: for the many populations that an
+/// evolution passes through.
+///
+/// # Errors
+/// [`Error::Usage`], as from [`encode`].
+pub fn encode_snapshot(population: &Population, meta: &Map<String, Value>) -> Result<Vec<u8>> {
+    encode_members(population, None, meta, Thrift::Time)
+}
+
+fn encode_members(
+    population: &Population,
+    fitness: Option<&[i64]>,
+    meta: &Map<String, Value>,
+    thrift: Thrift,
+) -> Result<Vec<u8>> {
     if let Some(key) =
         ["schema", "width_px", "height_px", "background", "blend"].iter().find(|&&key| meta.contains_key(key))
     {
         return Err(Error::Usage(format!("the metadata of a population cannot have a `{key}`: the file has its own")));
     }
-    write_members(population, fitness, meta)
+    write_members(population, fitness, meta, Members::new(thrift))
         .map_err(|error| Error::Usage(format!("the population cannot be written: {error}")))
 }
 
 fn write_members(
     population: &Population,
-    fitness: &[i64],
+    fitness: Option<&[i64]>,
     meta: &Map<String, Value>,
+    mut members: Members,
 ) -> zip::result::ZipResult<Vec<u8>> {
     let flies = &population.flies;
-    let mut members = Members::new();
     for (column, name) in GENE_COLUMNS.into_iter().enumerate() {
         members.add_column(name, "<f4", flies.iter().map(|fly| gene_values(fly)[column]))?;
     }
-    members.add_column("fitness", "<i8", fitness.iter().copied())?;
+    if let Some(fitness) = fitness {
+        members.add_column("fitness", "<i8", fitness.iter().copied())?;
+    }
     members.add_column("mask", "<u2", flies.iter().map(|fly| fly.mask))?;
     members.add_column("alive", "|b1", flies.iter().map(|fly| fly.alive))?;
     for (index, mask) in population.masks.layers().iter().enumerate() {
@@ -78,18 +108,25 @@ fn gene_values(fly: &Fly) -> [f32; 9] {
 /// The zip file under construction.
 struct Members {
     zip: ZipWriter<Cursor<Vec<u8>>>,
+    thrift: Thrift,
 }
 
 impl Members {
-    fn new() -> Self {
-        Self { zip: ZipWriter::new(Cursor::new(Vec::new())) }
+    fn new(thrift: Thrift) -> Self {
+        Self { zip: ZipWriter::new(Cursor::new(Vec::new())), thrift }
     }
 
     /// Begins a member; date, permissions and level are fixed so that nothing but the content decides the bytes.
     fn start(&mut self, name: &str) -> zip::result::ZipResult<()> {
+        let is_gene = || GENE_COLUMNS.iter().any(|column| npyz::npz::file_name_from_array_name(column) == name);
+        let (method, level) = match self.thrift {
+            Thrift::Bytes => (CompressionMethod::Deflated, Some(LEVEL)),
+            Thrift::Time if is_gene() => (CompressionMethod::Stored, None),
+            Thrift::Time => (CompressionMethod::Deflated, Some(SNAPSHOT_LEVEL)),
+        };
         let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Deflated)
-            .compression_level(Some(LEVEL))
+            .compression_method(method)
+            .compression_level(level)
             .last_modified_time(DateTime::default())
             .unix_permissions(0o644);
         self.zip.start_file(name, options)

@@ -14,7 +14,7 @@ use serde_json::{Map, Value};
 
 use crate::model::{Blend, Population};
 
-pub use encode::encode;
+pub use encode::{encode, encode_snapshot};
 pub use read::{read, read_meta};
 pub use table::{encode_csv, encode_json, is_csv_table, read_json_meta};
 

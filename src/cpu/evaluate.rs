@@ -65,8 +65,8 @@ impl LaneEvaluation {
         Self { lane, target, blocks, marginal: vec![0; fly_count], sae: 0, stale: Vec::new() }
     }
 
-    pub(super) fn scene(&self) -> &Scene {
-        self.lane.scene()
+    pub(super) fn lane(&self) -> &Lane {
+        &self.lane
     }
 
     /// Evaluates a whole population afresh.

@@ -8,7 +8,7 @@ mod evaluate;
 mod mosaic;
 
 use crate::error::Result;
-use crate::model::{Canvas, Change, Evaluation, Evaluator, Fly, Layers, Mosaic, Population, Scene};
+use crate::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
 
 use evaluate::LaneEvaluation;
 
@@ -27,8 +27,8 @@ impl CpuEvaluator {
 }
 
 impl Evaluator for CpuEvaluator {
-    fn scene(&self, lane: usize) -> &Scene {
-        self.lanes[lane].scene()
+    fn lane(&self, lane: usize) -> &Lane {
+        self.lanes[lane].lane()
     }
 
     fn lane_count(&self) -> usize {

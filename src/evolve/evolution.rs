@@ -3,12 +3,17 @@
 //! It alternates with an evaluator: [`Evolution::breed`] says what to change, the evaluator evaluates, and
 //! [`Evolution::absorb`] takes the new fitness in.
 
+use std::collections::BTreeSet;
+
+use super::breeder::Breeder;
+pub use super::first::random_population;
+use super::first::wear;
 use super::restart::BestPopulation;
 use super::scheme::{OnDry, PaperScheme};
-use super::selection::{Selection, Victim, choose_parent};
-use crate::model::operators::{Amplitudes, mutated, random_fly, tile_side};
+use super::selection::{Selection, Victim};
+use super::spread::Spread;
 use crate::model::rng::{Purpose, Stream};
-use crate::model::{Change, Evaluation, Fly};
+use crate::model::{Change, Evaluation, Fly, Lane, Target};
 
 /// Why an evolution ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,8 +77,11 @@ pub struct Evolution {
     width_px: u32,
     height_px: u32,
     flies: Vec<Fly>,
+    /// Flies that take part, from the first on; the others wait, absent, for mitosis.
+    living: usize,
+    sae: Option<u64>,
     best: Option<BestPopulation>,
-    amplitudes: Amplitudes,
+    breeder: Breeder,
     selection: Selection,
     outcome: Outcome,
     births_in_run: u64,
@@ -81,26 +89,30 @@ pub struct Evolution {
     stop: Option<StopReason>,
 }
 
-/// The first population of the paper's scheme: uniform random flies with sides by Eq. 1.
-#[must_use]
-pub fn random_population(width_px: u32, height_px: u32, fly_count: usize, seed: u64) -> Vec<Fly> {
-    let side = tile_side(width_px, height_px, fly_count);
-    let fly = |slot| random_fly(width_px, height_px, side, &mut Stream::new(seed, Purpose::FirstPopulation, 0, slot));
-    (0..fly_count as u64).map(fly).collect()
-}
-
 impl Evolution {
-    /// An evolution of `lane`, a picture of `width_px` x `height_px`, that begins from `flies`.
+    /// An evolution of `lane`, a picture of `width_px` x `height_px`, that begins from `flies`: a population by
+    /// [`super::first_population`] or [`super::begin_from`].
+    ///
+    /// # Panics
+    /// If there are no flies.
     #[must_use]
     pub fn new(scheme: PaperScheme, lane: usize, width_px: u32, height_px: u32, flies: Vec<Fly>) -> Self {
+        assert!(!flies.is_empty(), "an evolution needs a fly");
+        let living = scheme.living(0, flies.len());
+        let layers = match scheme.layers(0) {
+            [] => layers_worn(&flies),
+            named => named.to_vec(),
+        };
         Self {
-            amplitudes: Amplitudes::paper(width_px, height_px, flies.len()),
+            breeder: Breeder::new(&scheme, (width_px, height_px), living, &layers),
             selection: Selection::new(flies.len()),
             scheme,
             lane,
             width_px,
             height_px,
             flies,
+            living,
+            sae: None,
             best: None,
             outcome: Outcome::default(),
             births_in_run: 0,
@@ -133,6 +145,18 @@ impl Evolution {
         self.best.as_ref().map(BestPopulation::sae)
     }
 
+    /// Global fitness of the current population, once it was evaluated.
+    #[must_use]
+    pub fn sae(&self) -> Option<u64> {
+        self.sae
+    }
+
+    /// How diverse the current population is.
+    #[must_use]
+    pub fn spread(&self) -> Spread {
+        Spread::of(&self.flies, self.width_px, self.height_px)
+    }
+
     /// What was counted so far.
     #[must_use]
     pub fn outcome(&self) -> Outcome {
@@ -151,6 +175,12 @@ impl Evolution {
         self.scheme.births.saturating_mul(u64::from(self.scheme.restarts) + 1)
     }
 
+    /// Restarts that are made if nothing stops the evolution.
+    #[must_use]
+    pub fn restarts_planned(&self) -> u32 {
+        self.scheme.restarts
+    }
+
     /// Why the evolution ended, if it has.
     #[must_use]
     pub fn stop_reason(&self) -> Option<StopReason> {
@@ -162,24 +192,26 @@ impl Evolution {
         self.stop.get_or_insert(reason);
     }
 
-    /// Decides the next step against the fitness of the current population, and adds its changes to `changes`.
-    pub fn breed(&mut self, evaluation: &Evaluation<'_>, changes: &mut Vec<Change>) -> Step {
+    /// Decides the next step against the current population as `lane` holds it, and its fitness, and adds its changes to
+    /// `changes`.
+    pub fn breed(&mut self, lane: &Lane, evaluation: &Evaluation<'_>, changes: &mut Vec<Change>) -> Step {
         if let Some(reason) = self.stop {
             return Step::Stop(reason);
         }
         let left = self.scheme.births - self.births_in_run;
         if left == 0 {
-            return self.end_run(StopReason::Births);
+            return self.end_run(StopReason::Births, &lane.scene().target);
         }
         if self.scheme.patience.is_some_and(|patience| self.births_in_run - self.births_at_best >= patience) {
-            return self.end_run(StopReason::Patience);
+            return self.end_run(StopReason::Patience, &lane.scene().target);
         }
         self.selection.begin_generation();
-        let births = left.min(u64::from(self.scheme.batch_births));
+        // No fly dies twice in a generation.
+        let births = left.min(u64::from(self.scheme.batch_births)).min(self.living as u64);
         for birth in 0..births {
-            if !self.give_birth(evaluation.marginal, changes) {
+            if !self.give_birth(lane, &evaluation.marginal[..self.living], changes) {
                 if birth == 0 {
-                    return self.end_run(StopReason::Dry);
+                    return self.end_run(StopReason::Dry, &lane.scene().target);
                 }
                 break;
             }
@@ -188,7 +220,7 @@ impl Evolution {
     }
 
     /// One death and one birth; false if no fly may die.
-    fn give_birth(&mut self, marginal: &[i64], changes: &mut Vec<Change>) -> bool {
+    fn give_birth(&mut self, lane: &Lane, marginal: &[i64], changes: &mut Vec<Change>) -> bool {
         let run = self.outcome.restarts;
         let mut stream = Stream::new(self.scheme.seed, Purpose::Birth, run, self.births_in_run);
         let index = match self.selection.choose_victim(marginal, self.scheme.on_dry, &mut stream) {
@@ -199,8 +231,8 @@ impl Evolution {
             }
             Victim::Dry => return false,
         };
-        let parent = self.flies[choose_parent(marginal, &mut stream) as usize];
-        let fly = mutated(&parent, &self.amplitudes, self.width_px, self.height_px, &mut stream);
+        let child = self.breeder.child(&self.scheme, &self.flies, marginal, &mut stream);
+        let fly = self.scheme.color.born(lane, index, &child);
         changes.push(Change { lane: self.lane, index, fly });
         self.births_in_run += 1;
         self.outcome.births += 1;
@@ -208,7 +240,7 @@ impl Evolution {
     }
 
     /// Ends a run: the next one begins from the best population with cooler amplitudes, if any is left.
-    fn end_run(&mut self, reason: StopReason) -> Step {
+    fn end_run(&mut self, reason: StopReason, target: &Target) -> Step {
         let dry_stop = reason == StopReason::Dry && self.scheme.on_dry == OnDry::Stop;
         if dry_stop || self.outcome.restarts == self.scheme.restarts {
             self.stop = Some(reason);
@@ -217,15 +249,49 @@ impl Evolution {
         self.outcome.restarts += 1;
         self.births_in_run = 0;
         self.births_at_best = 0;
-        self.amplitudes = self.amplitudes.scaled(self.scheme.cool_q16);
+        self.breeder.cool(self.scheme.cool_q16);
         if let Some(best) = &mut self.best {
             best.restore(&mut self.flies);
+        }
+        let (has_split, has_changed_masks) = (self.split(target), self.change_masks());
+        if has_split || has_changed_masks {
+            // Populations of fewer flies or of other masks are not what the result is to be.
+            self.best = None;
         }
         Step::Restart
     }
 
+    /// Mitosis, if it is time for it: twice as many flies live in the run that begins, their steps and first sides by Eq. 1
+    /// for that number.
+    fn split(&mut self, target: &Target) -> bool {
+        let run = self.outcome.restarts;
+        if run > self.scheme.mitosis {
+            return false;
+        }
+        let living = self.scheme.living(run, self.flies.len());
+        let layers = self.breeder.layers().to_vec();
+        let before = std::mem::replace(&mut self.living, living);
+        self.breeder = Breeder::new(&self.scheme, (self.width_px, self.height_px), living, &layers);
+        (0..run).for_each(|_| self.breeder.cool(self.scheme.cool_q16));
+        self.breeder.split(&self.scheme, target, &mut self.flies, before, run);
+        true
+    }
+
+    /// Gives every fly a mask of the run that begins, if its masks are others than those of the last.
+    fn change_masks(&mut self) -> bool {
+        let run = self.outcome.restarts;
+        let layers = self.scheme.layers(run);
+        if layers.is_empty() || layers == self.breeder.layers() {
+            return false;
+        }
+        wear(&mut self.flies, layers, self.scheme.seed, run);
+        self.breeder.set_layers(layers);
+        true
+    }
+
     /// Takes in the changes that were made since the last call, and the global fitness that they led to.
     pub fn absorb(&mut self, changes: &[Change], sae: u64) {
+        self.sae = Some(sae);
         let best = self.best.get_or_insert_with(|| BestPopulation::new(&self.flies, sae));
         for change in changes {
             self.flies[change.index as usize] = change.fly;
@@ -238,4 +304,10 @@ impl Evolution {
             self.stop(StopReason::TargetSae);
         }
     }
+}
+
+/// The mask layers that living flies wear, each once.
+fn layers_worn(flies: &[Fly]) -> Vec<u16> {
+    let worn: BTreeSet<u16> = flies.iter().filter(|fly| fly.alive).map(|fly| fly.mask).collect();
+    worn.into_iter().collect()
 }

@@ -207,8 +207,8 @@ fn marginal_range(span: &LaneSpan) -> (u64, u64) {
 }
 
 impl Evaluator for GpuEvaluator {
-    fn scene(&self, lane: usize) -> &Scene {
-        self.lanes[lane].scene()
+    fn lane(&self, lane: usize) -> &Lane {
+        &self.lanes[lane]
     }
 
     fn lane_count(&self) -> usize {

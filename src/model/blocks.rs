@@ -104,7 +104,7 @@ impl BlockLists {
     }
 
     /// Numbers of the blocks that the tile's box touches.
-    fn blocks_of(&self, tile: &Tile) -> impl Iterator<Item = usize> + use<> {
+    pub fn blocks_of(&self, tile: &Tile) -> impl Iterator<Item = usize> + use<> {
         let (side, columns) = (self.side_px as i32, self.columns as usize);
         // An empty tile has x0 > x1, but both may lie in one block.
         let column_range = if tile.is_empty() { 0..0 } else { tile.x0 / side..tile.x1 / side + 1 };

@@ -1,7 +1,7 @@
 //! What an evaluator answers: global and marginal fitness, layers, and the drawn mosaic.
 
 use super::fly::Fly;
-use super::lane::Scene;
+use super::lane::{Lane, Scene};
 use super::mosaic::Mosaic;
 use super::population::Population;
 use super::tile::Canvas;
@@ -43,8 +43,13 @@ pub struct Layers {
 ///
 /// Every implementation gives the same numbers and the same pixels.
 pub trait Evaluator: Send {
+    /// What the host keeps of `lane`: its scene, and the tiles and block lists of the loaded population.
+    fn lane(&self, lane: usize) -> &Lane;
+
     /// What stays the same while `lane` evolves.
-    fn scene(&self, lane: usize) -> &Scene;
+    fn scene(&self, lane: usize) -> &Scene {
+        self.lane(lane).scene()
+    }
 
     /// Number of lanes.
     fn lane_count(&self) -> usize;

@@ -14,6 +14,10 @@ pub enum Purpose {
     FirstPopulation = 1,
     /// One birth of the paper's scheme (selection and mutation); round = run, slot = birth.
     Birth = 2,
+    /// The mask that a fly wears from a run on; round = run, slot = fly.
+    Mask = 3,
+    /// The mutated half of a fly that splits; round = run, slot = its place.
+    Mitosis = 4,
 }
 
 /// An endless sequence of 32-bit numbers, named by (seed, purpose, round, slot).
@@ -48,6 +52,11 @@ impl Stream {
     /// A number below `bound`, which must not be 0. The bias is at most `bound` / 2^32.
     pub fn below(&mut self, bound: u32) -> u32 {
         ((u64::from(self.bits()) * u64::from(bound)) >> 32) as u32
+    }
+
+    /// True with a probability of `probability_q16` / 65536: always from 65,536 on.
+    pub fn chance(&mut self, probability_q16: u32) -> bool {
+        self.bits() >> 16 < probability_q16
     }
 }
 
@@ -120,5 +129,13 @@ mod tests {
         let mut counts = [0_u32; 7];
         (0..70_000).for_each(|_| counts[stream.below(7) as usize] += 1);
         assert!(counts.iter().all(|count| (9_600..10_400).contains(count)), "{counts:?}");
+    }
+
+    #[test]
+    fn chances_are_as_likely_as_they_say() {
+        let mut stream = Stream::new(2, Purpose::Birth, 0, 0);
+        assert!((0..10_000).all(|_| stream.chance(1 << 16) && !stream.chance(0)));
+        let hits = (0..10_000).filter(|_| stream.chance(1 << 14)).count();
+        assert!((2_300..2_700).contains(&hits), "{hits} of 10,000 at 1/4");
     }
 }

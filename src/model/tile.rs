@@ -179,6 +179,13 @@ impl Fly {
     pub fn color(&self) -> Rgb {
         [self.r, self.g, self.b].map(|channel| ((u32::from(channel) * 255 + 32_767) / 65_535) as u8)
     }
+
+    /// The fly with a colour as stored in pictures; [`Fly::color`] gives the same colour back.
+    #[must_use]
+    pub fn with_color(&self, color: Rgb) -> Self {
+        let [r, g, b] = color.map(|channel| u16::from(channel) * 257);
+        Self { r, g, b, ..*self }
+    }
 }
 
 /// A colour in one word: red in the lowest byte, then green, then blue; the highest byte is 0.

@@ -2,7 +2,7 @@
 //!
 //! A row at a time in 16 bits per channel, so that a 16-bit picture in a linear profile keeps its shadows.
 
-use image::{DynamicImage, ImageBuffer, Pixel, RgbImage};
+use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Pixel, RgbImage};
 
 use super::icc::Profile;
 
@@ -31,6 +31,28 @@ pub(super) fn to_opaque_srgb(
         DynamicImage::ImageRgba32F(image) => rows.convert(&image, quantised),
         image => rows.convert(&image.into_rgba16(), |channel| channel),
     }
+}
+
+/// The luma (weights of Rec. 709, of stored sRGB values) and the alpha of a picture.
+///
+/// A profile that cannot be used is left out: it would hardly change the luma.
+pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> GrayAlphaImage {
+    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, image.color().has_color()));
+    let profile = profile.unwrap_or(Profile::Srgb);
+    let image = image.into_rgba16();
+    let mut stencil = Vec::with_capacity(image.width() as usize * image.height() as usize * 2);
+    let (mut row, mut scratch) = (Vec::new(), Vec::new());
+    for pixels in image.rows() {
+        row.clear();
+        row.extend(pixels.map(|pixel| pixel.0));
+        profile.apply(&mut row, &mut scratch);
+        for &[r, g, b, alpha] in &row {
+            let luma = u64::from(r) * 2126 + u64::from(g) * 7152 + u64::from(b) * 722;
+            stencil.push(((luma + 10_000 * 257 / 2) / (10_000 * 257)) as u8);
+            stencil.push(((u32::from(alpha) + 128) / 257) as u8);
+        }
+    }
+    GrayAlphaImage::from_raw(image.width(), image.height(), stencil).expect("every row has been converted")
 }
 
 /// An 8-bit channel in 16 bits: 0 stays 0, 255 becomes 65,535.

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, RgbImage};
 use sha2::{Digest, Sha256};
 
@@ -70,6 +71,18 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     Ok(Loaded { photo, original_width_px, original_height_px, sha256, warnings })
 }
 
+/// Whether the file at `path` begins like a picture that can be read.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read.
+pub(super) fn is_picture(path: &Path) -> Result<bool> {
+    let mut signature = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(SIGNATURE_BYTES).read_to_end(&mut signature))
+        .map_err(|error| Error::input(path, why_unreadable(&error)))?;
+    Ok(known_format(&signature).is_some())
+}
+
 /// The bytes of the file at `path`, once its first bytes have shown that it is a picture.
 fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
     let unreadable = |error: io::Error| Error::input(path, why_unreadable(&error));
@@ -100,7 +113,7 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
 }
 
 /// The format that the first bytes of a file tell, if it is one that is read.
-fn known_format(bytes: &[u8]) -> Option<ImageFormat> {
+pub(super) fn known_format(bytes: &[u8]) -> Option<ImageFormat> {
     use ImageFormat::{Bmp, Gif, Jpeg, Png, Tiff, WebP};
     image::guess_format(bytes).ok().filter(|format| matches!(format, Png | Jpeg | WebP | Tiff | Bmp | Gif))
 }
@@ -112,6 +125,22 @@ fn decode(
     background: [u8; 3],
     warnings: &mut Vec<String>,
 ) -> Result<RgbImage, String> {
+    let raw = decode_raw(bytes, format)?;
+    let mut image =
+        DynamicImage::ImageRgb8(color::to_opaque_srgb(raw.image, raw.profile.as_deref(), background, warnings));
+    image.apply_orientation(raw.orientation);
+    Ok(image.into_rgb8())
+}
+
+/// What a decoder gives, and what is left to do to it.
+pub(super) struct Raw {
+    pub(super) image: DynamicImage,
+    pub(super) profile: Option<Vec<u8>>,
+    pub(super) orientation: Orientation,
+}
+
+/// The picture in `bytes` as it is stored, within the limits, or a sentence that says why there is none.
+pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat) -> Result<Raw, String> {
     let broken = |error: ImageError| why_undecodable(format, error);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::no_limits();
@@ -125,10 +154,8 @@ fn decode(
     }
     let orientation = decoder.orientation().map_err(broken)?;
     let profile = decoder.icc_profile().map_err(broken)?;
-    let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
-    let mut image = DynamicImage::ImageRgb8(color::to_opaque_srgb(decoded, profile.as_deref(), background, warnings));
-    image.apply_orientation(orientation);
-    Ok(image.into_rgb8())
+    let image = DynamicImage::from_decoder(decoder).map_err(broken)?;
+    Ok(Raw { image, profile, orientation })
 }
 
 /// Refuses sizes that are nothing or too much, before anything of that size is allocated.

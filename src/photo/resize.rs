@@ -16,15 +16,25 @@ const SUPPORT: f64 = 3.0;
 
 /// The picture with its longer side reduced to `long_side_px`; the same picture if it is not longer than that.
 pub(super) fn fit(image: &RgbImage, long_side_px: Option<u32>) -> Photo {
-    let (width_px, height_px) = fitted_size(image.width(), image.height(), long_side_px);
     // A view, since a copy of the largest picture that is read takes most of a GiB.
     let (source, _) = image.as_raw().as_chunks::<3>();
-    if (width_px, height_px) == image.dimensions() {
+    fit_pixels(source, image.dimensions(), long_side_px)
+}
+
+/// `photo` with its longer side reduced to `long_side_px`, at least 1, by Lanczos3; a copy if it is not longer than that.
+#[must_use]
+pub fn fitted(photo: &Photo, long_side_px: u32) -> Photo {
+    fit_pixels(&photo.pixels, (photo.width_px, photo.height_px), Some(long_side_px))
+}
+
+fn fit_pixels(source: &[[u8; 3]], size_px: (u32, u32), long_side_px: Option<u32>) -> Photo {
+    let (width_px, height_px) = fitted_size(size_px.0, size_px.1, long_side_px);
+    if (width_px, height_px) == size_px {
         return Photo { width_px, height_px, pixels: source.to_vec() };
     }
     let filter = Filter::new(Box::new(|x| lanczos3(f64::from(x)) as f32), SUPPORT as f32);
     let [width, height, fitted_width, fitted_height] =
-        [image.width(), image.height(), width_px, height_px].map(|side_px| side_px as usize);
+        [size_px.0, size_px.1, width_px, height_px].map(|side_px| side_px as usize);
     let mut pixels = vec![[0; 3]; fitted_width * fitted_height];
     Resizer::new(width, height, fitted_width, fitted_height, Channels, Type::Custom(filter))
         .and_then(|mut resizer| resizer.resize(source, &mut pixels))

@@ -7,13 +7,13 @@ use crate::workshop::Workshop;
 
 const ENDLESS: &str = "evolve photo.png -n 60 --births 1000000M --progress json";
 
-fn send(signal: &str, child: &Child) {
+pub fn send(signal: &str, child: &Child) {
     let status = Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status().unwrap();
     assert!(status.success(), "the signal is sent");
 }
 
 /// Starts the program, sends the signals once it is evolving, and returns its end with the rest of its messages.
-fn interrupted(workshop: &Workshop, line: &str, signals: &[&str]) -> (ExitStatus, String) {
+pub fn interrupted(workshop: &Workshop, line: &str, signals: &[&str]) -> (ExitStatus, String) {
     let mut child = workshop.command(line).spawn().unwrap();
     let mut messages = BufReader::new(child.stderr.take().unwrap());
     let mut text = String::new();

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// The modules of the crate, lowest level first. A module imports only modules of lower levels.
 const LEVELS: [&[&str]; 7] = [
     &["error"],
-    &["photo", "output", "model"],
-    &["archive", "evolve", "cpu", "vk", "vector", "openraster"],
+    &["photo", "output", "model", "metrics", "plot"],
+    &["archive", "evolve", "shapes", "cpu", "vk", "vector", "openraster"],
     &["gpu"],
     &["engine"],
     &["app"],

@@ -1,0 +1,150 @@
+//! The files of `--curve`: where they may go, and what is in them.
+//!
+//! One rule: a file that is there is replaced if it is a curve of the same command, which its key tells (the last column
+//! of the CSV, the last line of the SVG); any other file only with `--force`.
+
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use super::curve::{CSV_HEADER, Curve};
+use super::destination::{self, Destination};
+use super::interrupt::Interrupt;
+use super::options::Overwrite;
+use crate::error::{Error, Result};
+use crate::output;
+
+/// Digits of the result's key that a curve holds.
+const KEY_DIGITS: usize = 16;
+/// Most bytes of a file that are looked at to see whether it is a curve: many times what one has.
+const BYTES_MAX: u64 = 1 << 24;
+
+/// What is written to the file of a curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    Csv,
+    Svg,
+}
+
+/// A file that a curve is written to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct CurveFile {
+    pub path: PathBuf,
+    form: Form,
+}
+
+impl CurveFile {
+    /// The file at `path`, whose ending tells what is written.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it is another than .csv or .svg.
+    pub(super) fn new(path: &Path) -> Result<Self> {
+        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
+        let form = match extension.as_str() {
+            "csv" => Form::Csv,
+            "svg" => Form::Svg,
+            _ => {
+                let path = path.display();
+                return Err(Error::Usage(format!("{path}: the file of --curve must end in .csv or .svg")));
+            }
+        };
+        Ok(Self { path: path.to_owned(), form })
+    }
+
+    /// What this curve is in this form.
+    fn encode(&self, curve: &Curve, title: &str, key: &str) -> Result<Vec<u8>> {
+        match self.form {
+            Form::Csv => Ok(curve.csv(short(key)).into_bytes()),
+            Form::Svg => Ok(format!("{}\n{}\n", curve.plot(title.to_owned())?.trim_end(), svg_end(key)).into_bytes()),
+        }
+    }
+
+    /// Refuses to replace a file that is no curve of the same command.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it would.
+    pub(super) fn check_replaceable(&self, key: &str, overwrite: Overwrite) -> Result<()> {
+        if overwrite == Overwrite::Force || !self.path.is_file() {
+            return Ok(());
+        }
+        let mut text = String::new();
+        let is_text = File::open(&self.path).and_then(|file| file.take(BYTES_MAX).read_to_string(&mut text)).is_ok();
+        let last_line = text.lines().next_back().unwrap_or_default();
+        let (is_curve, is_same) = match self.form {
+            Form::Csv => (text.starts_with(CSV_HEADER), last_line.ends_with(&format!(",{}", short(key)))),
+            Form::Svg => (last_line.starts_with(SVG_END), last_line == svg_end(key)),
+        };
+        let why = match (is_text && is_curve, is_same) {
+            (true, true) => return Ok(()),
+            (true, false) => "made with other options",
+            (false, _) => "not made by smalti",
+        };
+        let path = self.path.display();
+        Err(Error::Usage(format!("{path} exists and was {why}; name another file, or replace it with --force")))
+    }
+}
+
+/// The files that were named, checked against the other outputs and the input, before anything is read.
+///
+/// # Errors
+/// [`Error::Usage`] if a file is named twice or is the input; [`Error::Output`] if it cannot be written.
+pub(super) fn check_writable<'a>(
+    curves: &[CurveFile],
+    others: impl Iterator<Item = &'a Destination>,
+    input: &Path,
+) -> Result<()> {
+    let mut seen: Vec<PathBuf> = others.map(|other| destination::place_of(&other.path)).collect();
+    for CurveFile { path, .. } in curves {
+        let place = destination::place_of(path);
+        if place == destination::place_of(input) {
+            return Err(Error::Usage(format!("{} is the input; name another file for the curve", path.display())));
+        }
+        if seen.contains(&place) {
+            return Err(Error::Usage(format!("{} is named twice as an output", path.display())));
+        }
+        output::check_writable(path)?;
+        seen.push(place);
+    }
+    Ok(())
+}
+
+/// Writes a curve to its files, each in one step, and adds to `written` those that are there now.
+///
+/// # Errors
+/// The first failure; the files after it are written nevertheless.
+pub(super) fn write(
+    files: &[CurveFile],
+    (curve, title, key): (&Curve, &str, &str),
+    interrupt: &mut Interrupt,
+    written: &mut Vec<String>,
+) -> Result<()> {
+    let mut outcome = Ok(());
+    for file in files {
+        let one = file.encode(curve, title, key).and_then(|bytes| {
+            let write = || output::write_atomically(&file.path, &bytes);
+            // Into a pipe it may take as long as its reader likes.
+            if file.path.metadata().is_ok_and(|found| !found.is_file()) {
+                write()
+            } else {
+                interrupt.while_writing(write)
+            }
+        });
+        if one.is_ok() {
+            written.push(file.path.display().to_string());
+        }
+        outcome = outcome.and(one);
+    }
+    outcome
+}
+
+/// How the last line of a plot begins.
+const SVG_END: &str = "<!-- smalti curve ";
+
+fn svg_end(key: &str) -> String {
+    format!("{SVG_END}{} -->", short(key))
+}
+
+fn short(key: &str) -> &str {
+    key.get(..KEY_DIGITS).unwrap_or(key)
+}

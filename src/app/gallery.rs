@@ -1,0 +1,190 @@
+//! `smalti gallery`: every mask under every shader on the same pictures, as contact sheets and a page of Markdown.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::cli::ProgressKind;
+use super::interrupt::Interrupt;
+use super::look::{Dress, Look, LookArgs};
+use super::options;
+use super::progress::Progress;
+use super::sheet::sheet;
+use super::study::{Evolved, Recipe, Study};
+use super::{device, report, run, values};
+use crate::error::{Error, Result};
+use crate::evolve::{ColorMode, ColorRule, PaperScheme};
+use crate::model::{Canvas, Target};
+use crate::output;
+use crate::photo::{self, Format, Metadata, Photo, ReadOptions};
+use crate::shapes::{BuiltIn, Shader};
+use crate::vk::Validation;
+
+/// Longer side in px that pictures are evolved at, and cells are shown at.
+const SIDE_PX: u32 = 256;
+/// Few enough tiles to see their shape.
+const FLY_COUNT: usize = 700;
+/// Runs after the first, with steps halved at each: closer to the picture than one long run.
+const RESTARTS: u32 = 3;
+/// Samples along each side of a pixel of a cell.
+const SUPERSAMPLING: u32 = 4;
+/// Of the contact sheets, 1 to 100.
+const JPEG_QUALITY: u8 = 85;
+/// Opacity of whole tiles under shaders that are made for translucent tiles.
+const OPACITY: f64 = 0.85;
+
+/// The flags.
+#[derive(Debug, Args)]
+pub(super) struct GalleryArgs {
+    /// Pictures to show every mask and shader on
+    #[arg(value_name = "IN", required = true)]
+    pub inputs: Vec<PathBuf>,
+    /// Folder for README.md and its contact sheets; created if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Births of each of four runs (suffixes k, M)
+    #[arg(long, value_name = "B", value_parser = values::count, default_value = "20k")]
+    pub births: u64,
+    /// Number that decides every random choice
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub seed: u64,
+    /// Replace a README.md that is not a gallery
+    #[arg(long)]
+    pub force: bool,
+    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
+    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
+    pub device: String,
+    /// CPU threads, 1 to 1,024; changes no result [default: all]
+    #[arg(long, value_name = "T", value_parser = values::count)]
+    pub threads: Option<u64>,
+    /// How to show progress on stderr
+    #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
+    pub progress: ProgressKind,
+}
+
+/// First line of a gallery's page, which tells it from other files.
+const TITLE: &str = "# Gallery of masks and shaders";
+
+/// Makes the gallery; the exit code of the process.
+pub(super) fn make(args: &GalleryArgs) -> ExitCode {
+    match try_make(args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            report::error(&error.to_string());
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn try_make(args: &GalleryArgs) -> Result<()> {
+    let interrupt = Interrupt::listen()?;
+    run::start_threads(options::thread_count(args.threads)?)?;
+    let page = args.output.join("README.md");
+    check_page(&page, args.force)?;
+    let targets = args.inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
+    std::fs::create_dir_all(&args.output)
+        .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
+    let device = device::select(&options::device(&args.device)?, Validation::Off)?;
+    report::say_device(&device);
+    let began = Instant::now();
+    let study = Study::new(&device, &interrupt, Progress::new(args.progress));
+    let made = Shader::ALL.into_iter().try_for_each(|shader| make_sheet(args, &study, &targets, shader));
+    study.finish();
+    made?;
+    output::write_atomically(&page, markdown(args).as_bytes())?;
+    report::say(&format!("wrote {} in {:.1} s", page.display(), began.elapsed().as_secs_f64()));
+    Ok(())
+}
+
+fn check_page(page: &Path, force: bool) -> Result<()> {
+    let is_foreign = std::fs::read(page).is_ok_and(|bytes| !bytes.starts_with(TITLE.as_bytes()));
+    if is_foreign && !force {
+        let path = page.display();
+        return Err(Error::Usage(format!(
+            "{path} exists and is no gallery; name another folder, or replace it with --force"
+        )));
+    }
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<Arc<Target>> {
+    let reading = ReadOptions { long_side_px: Some(SIDE_PX), ..ReadOptions::default() };
+    let Photo { width_px, height_px, pixels } = photo::read(path, &reading)?.photo;
+    Target::new(width_px, height_px, pixels).map(Arc::new)
+}
+
+/// Evolves every mask under `shader` on all pictures, and writes the sheet: a row per picture, a column per mask.
+fn make_sheet(args: &GalleryArgs, study: &Study<'_>, targets: &[Arc<Target>], shader: Shader) -> Result<()> {
+    let recipes = targets
+        .iter()
+        .flat_map(|target| BuiltIn::ALL.map(|shape| recipe(args, target, shape, shader)))
+        .collect::<Result<Vec<Recipe>>>()?;
+    let evolved = study.evolve(&recipes)?;
+    let draw = |(recipe, made): (&Recipe, &Evolved)| {
+        let population = &made.population;
+        let canvas = Canvas::scaled(population.width_px, population.height_px, SIDE_PX);
+        study.draw(recipe, population, (&canvas, SUPERSAMPLING))
+    };
+    let photos = recipes.iter().zip(&evolved).map(draw).collect::<Result<Vec<_>>>()?;
+    let rows: Vec<Vec<Option<&Photo>>> =
+        photos.chunks(BuiltIn::ALL.len()).map(|row| row.iter().map(Some).collect()).collect();
+    let jpeg = Format::Jpeg { quality: JPEG_QUALITY };
+    let bytes = photo::encode(jpeg, &sheet(&rows, SIDE_PX)?, &Metadata::new())?;
+    output::write_atomically(&args.output.join(file_of(shader)), &bytes)
+}
+
+fn recipe(args: &GalleryArgs, target: &Arc<Target>, shape: BuiltIn, shader: Shader) -> Result<Recipe> {
+    let look = LookArgs {
+        masks: vec![PathBuf::from(shape.name())],
+        shader: Some(shader),
+        opacity: shader.is_translucent().then_some(OPACITY),
+        ..LookArgs::default()
+    };
+    let Dress { masks, layers_by_run } = Look::new(&look, &[], None)?.dress()?;
+    let scheme = PaperScheme {
+        seed: args.seed,
+        births: args.births,
+        restarts: RESTARTS,
+        cool_q16: 1 << 15,
+        masks: layers_by_run,
+        color: ColorRule { mode: ColorMode::Mean, ..ColorRule::default() },
+        ..PaperScheme::default()
+    };
+    Ok(Recipe { target: Arc::clone(target), fly_count: FLY_COUNT, masks: Arc::new(masks), scheme })
+}
+
+fn file_of(shader: Shader) -> String {
+    format!("{}.jpg", shader.name())
+}
+
+/// The page.
+fn markdown(args: &GalleryArgs) -> String {
+    let mut page = format!(
+        "{TITLE}\n\nEach sheet is one shader (`--shader`), each column one mask (`--mask`), in this order:\n\n| mask | what it is |\n|---|---|\n"
+    );
+    // Writing to a string cannot fail.
+    for shape in BuiltIn::ALL {
+        let _ = writeln!(page, "| `{}` | {} |", shape.name(), shape.description());
+    }
+    for shader in Shader::ALL {
+        let (name, description, file) = (shader.name(), shader.description(), file_of(shader));
+        let blend = if shader.is_translucent() { format!(" (`--opacity {OPACITY}`)") } else { String::new() };
+        let _ = write!(page, "\n## `{name}`\n\nShader `{name}`{blend}: {description}.\n\n![{name}]({file})\n");
+    }
+    let names: Vec<String> = args.inputs.iter().map(|path| path.display().to_string()).collect();
+    let _ = write!(
+        page,
+        "\nMade by `smalti gallery {} -o {} --births {} --seed {}`: {FLY_COUNT} tiles at {SIDE_PX} px, {} runs with steps \
+         halved at each, mean colours.\n",
+        names.join(" "),
+        args.output.display(),
+        args.births,
+        args.seed,
+        RESTARTS + 1
+    );
+    page
+}

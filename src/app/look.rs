@@ -1,0 +1,130 @@
+//! How tiles look: the flags about masks and shaders, which several commands share, and the masks that they ask for.
+
+use std::num::NonZeroU8;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::presets::{Preset, Shaders};
+use crate::error::{Error, Result};
+use crate::model::{Blend, MaskSet};
+use crate::shapes::{BuiltIn, Outfit, Shader, Template, Wardrobe};
+
+/// The flags.
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Tiles")]
+pub(super) struct LookArgs {
+    /// Shape of the tiles: square, border, lines, flower, disc, triangle, hexagon, brush, or a PNG or SVG file; several
+    /// with commas or repeated, for a mix [default: square]
+    #[arg(long = "mask", value_name = "NAME|FILE", value_delimiter = ',')]
+    pub masks: Vec<PathBuf>,
+    /// What the drawing of a mask becomes: template (its own shading), flat, outline, emboss, soft, hollow, negative, fade
+    /// or wash [default: template]
+    #[arg(long, value_name = "NAME")]
+    pub shader: Option<Shader>,
+    /// Whether a mask's coverage cuts the tile out or is its opacity [default: opaque, or translucent with --opacity]
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub blend: Option<BlendName>,
+    /// Opacity of whole tiles, 0.01 to 1 [default: 1]
+    #[arg(long, value_name = "A")]
+    pub opacity: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum BlendName {
+    Opaque,
+    Translucent,
+}
+
+/// What was asked for, checked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Look {
+    masks: Vec<PathBuf>,
+    /// Worn from the first restart on; empty if they stay.
+    restart_masks: Vec<PathBuf>,
+    shader: Shader,
+    blend: Blend,
+    opacity: NonZeroU8,
+}
+
+/// The masks of an evolution, and who wears them when.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Dress {
+    pub masks: MaskSet,
+    /// Layers of `masks` that flies wear, by run; later runs wear the last.
+    pub layers_by_run: Vec<Vec<u16>>,
+}
+
+impl Dress {
+    /// Whether all flies are plain opaque squares from first to last.
+    pub(super) fn is_plain(&self) -> bool {
+        self.masks == MaskSet::default() && self.layers_by_run.iter().flatten().all(|&layer| layer == 0)
+    }
+}
+
+impl Look {
+    /// Checks the flags; `restart_masks` are those from the first restart on, and what is not told is as in `preset`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names the flag and what it may be.
+    pub(super) fn new(args: &LookArgs, restart_masks: &[PathBuf], preset: Option<Preset>) -> Result<Self> {
+        let opacity = args.opacity.unwrap_or(1.0);
+        if !(0.01..=1.0).contains(&opacity) {
+            return Err(Error::Usage(format!("--opacity {opacity}: must be 0.01 to 1")));
+        }
+        let blend = match args.blend {
+            Some(BlendName::Translucent) => Blend::Translucent,
+            Some(BlendName::Opaque) if opacity < 1.0 => {
+                return Err(Error::Usage("--opacity below 1 needs --blend translucent, or none".to_owned()));
+            }
+            None if opacity < 1.0 => Blend::Translucent,
+            _ => Blend::Opaque,
+        };
+        // What a preset says of "complex shapes" is not in the paper; any other mask takes its place.
+        let complex = || vec![PathBuf::from(BuiltIn::Flower.name())];
+        let (masks, restart_masks) = match preset.map(|preset| preset.shaders) {
+            Some(Shaders::Two) if args.masks.is_empty() => (complex(), restart_masks.to_vec()),
+            Some(Shaders::OneThenTwo) if restart_masks.is_empty() => {
+                let later = if args.masks.is_empty() { complex() } else { args.masks.clone() };
+                (Vec::new(), later)
+            }
+            _ => (args.masks.clone(), restart_masks.to_vec()),
+        };
+        let opacity = NonZeroU8::new((opacity * 255.0).round() as u8).unwrap_or(NonZeroU8::MAX);
+        Ok(Self { masks, restart_masks, shader: args.shader.unwrap_or(Shader::Template), blend, opacity })
+    }
+
+    /// Whether nothing was asked for.
+    pub(super) fn is_default(&self) -> bool {
+        self.masks.is_empty()
+            && self.restart_masks.is_empty()
+            && self.shader == Shader::Template
+            && self.blend == Blend::Opaque
+    }
+
+    /// Whether tiles change their masks at the first restart.
+    pub(super) fn changes_at_restart(&self) -> bool {
+        !self.restart_masks.is_empty()
+    }
+
+    /// Reads and shades the masks.
+    ///
+    /// # Errors
+    /// If a mask cannot be read, or covers nothing.
+    pub(super) fn dress(&self) -> Result<Dress> {
+        let square = [PathBuf::from(BuiltIn::Square.name())];
+        let first: &[PathBuf] = if self.masks.is_empty() { &square } else { &self.masks };
+        let outfits: Vec<Outfit> = first
+            .iter()
+            .chain(&self.restart_masks)
+            .map(|name| Ok(Outfit { template: Template::find(name)?, shader: self.shader }))
+            .collect::<Result<_>>()?;
+        let Wardrobe { masks, layers } = Wardrobe::new(&outfits, self.blend, self.opacity)?;
+        let (first, later) = layers.split_at(first.len());
+        let mut layers_by_run = vec![first.to_vec()];
+        if !later.is_empty() {
+            layers_by_run.push(later.to_vec());
+        }
+        Ok(Dress { masks, layers_by_run })
+    }
+}

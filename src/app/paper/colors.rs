@@ -1,0 +1,190 @@
+//! Figures 6 and 9: colours evolved or picked, edges, and the rivals.
+
+use rayon::prelude::*;
+
+use super::gimp;
+use super::page::{Cell, Content, FigureTable, Page, PictureTable};
+use super::pictures::{photo_of, plain_grid};
+use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness};
+use crate::app::presets::Preset;
+use crate::app::study::{Evolved, score};
+use crate::error::{Error, Result};
+use crate::evolve::ColorMode;
+use crate::metrics::edge_pixels;
+use crate::model::{Mask, Target};
+use crate::photo::Photo;
+use crate::shapes::{BuiltIn, Shader};
+
+/// What stands in place of GIMPressionist's pictures.
+const NO_GIMP: &str = "GIMP is not installed (program gimp, version 2.10)";
+
+/// A mosaic of one picture by one way of making it.
+struct Entry {
+    /// The way, for people and for files.
+    label: String,
+    stem: String,
+    /// One per picture; or why it is missing.
+    photos: Vec<Result<Photo, String>>,
+}
+
+/// Figure 6: where colours come from, and how edges are kept.
+pub(super) fn fig6(bench: &Workbench<'_>) -> Result<Page> {
+    const MODES: [(&str, ColorMode); 4] = [
+        ("evolved", ColorMode::Evolved),
+        ("picked", ColorMode::Pick),
+        ("mean", ColorMode::Mean),
+        ("median", ColorMode::Median),
+    ];
+    let preset = Preset::paper(3);
+    let recipes = bench.recipes_of_all(|picture| {
+        let recipe = |(_, mode): &(_, ColorMode)| {
+            let mut recipe = bench.recipe(picture, preset, &Tiles::default())?;
+            recipe.scheme.color.mode = *mode;
+            Ok(recipe)
+        };
+        MODES.iter().map(recipe).collect()
+    })?;
+    let evolved = bench.study.evolve(&recipes)?;
+    let targets: Vec<&Target> = recipes.iter().step_by(MODES.len()).map(|recipe| &*recipe.target).collect();
+    let mut entries: Vec<Entry> = (0..MODES.len())
+        .map(|mode| entry_of(format!("colours {}", MODES[mode].0), MODES[mode].0, &evolved, mode, MODES.len()))
+        .collect();
+    entries.push(grid_entry(&targets, recipes[0].fly_count));
+    entries.push(gimp_entry("square", &targets, recipes[0].fly_count, &Mask::square()));
+
+    let mut page = Page::new(
+        "Figure 6: colours evolved or picked, and edges",
+        "The paper says that evolved colours give a closer likeness than colours picked from the picture at a tile's centre, \
+         and that edges are kept better than by GIMPressionist. One run of scheme 3 each; the edges are Canny's, and \
+         edge F1 says how well they are kept.",
+    );
+    let (mosaics, table) = present(bench, "fig6", &targets, &entries)?;
+    page.push("Mosaics", Content::Pictures(mosaics));
+    page.push("Edges", Content::Pictures(edges(bench, &targets, &entries)?));
+    page.push("Likeness", Content::Figures(bench.write_table("fig6.csv", table)?));
+    Ok(page)
+}
+
+/// Figure 9: tile types beside GIMPressionist with brushes of the same shapes.
+pub(super) fn fig9(bench: &Workbench<'_>) -> Result<Page> {
+    let types = [
+        ("square", BuiltIn::Square, Shader::Template, None),
+        ("lines", BuiltIn::Lines, Shader::Template, None),
+        ("flower", BuiltIn::Flower, Shader::Template, None),
+        ("spray", BuiltIn::Disc, Shader::Soft, Some(0.8)),
+    ];
+    let preset = Preset::paper(7);
+    let recipes = bench.recipes_of_all(|picture| {
+        let recipe = |&(_, shape, shader, opacity): &(_, BuiltIn, Shader, Option<f64>)| {
+            bench.recipe(picture, preset, &Tiles { mask: Some(shape.name()), shader: Some(shader), opacity })
+        };
+        types.iter().map(recipe).collect()
+    })?;
+    let evolved = bench.study.evolve(&recipes)?;
+    let targets: Vec<&Target> = recipes.iter().step_by(types.len()).map(|recipe| &*recipe.target).collect();
+    let fly_count = recipes[0].fly_count;
+    let mut entries = Vec::new();
+    for (number, (name, shape, shader, _)) in types.iter().enumerate() {
+        entries.push(entry_of(format!("smalti, {name}"), name, &evolved, number, types.len()));
+        let brush = shader.mask(&shape.template());
+        entries.push(gimp_entry(name, &targets, fly_count, &brush));
+    }
+    entries.push(grid_entry(&targets, fly_count));
+    let mut page = Page::new(
+        "Figure 9: tile types beside GIMPressionist",
+        "Mosaics, stripes, flowers and spray paint: two runs at 512 px each, beside GIMPressionist with a brush of the same \
+         shape and as many strokes. The plain grid of mean colours is the least that a mosaic should beat.",
+    );
+    let (mosaics, table) = present(bench, "fig9", &targets, &entries)?;
+    page.push("Mosaics", Content::Pictures(mosaics));
+    page.push("Likeness", Content::Figures(bench.write_table("fig9.csv", table)?));
+    Ok(page)
+}
+
+/// The results of one of several ways, which take turns in `evolved`.
+fn entry_of(label: String, stem: &str, evolved: &[Evolved], way: usize, way_count: usize) -> Entry {
+    let photos = evolved.iter().skip(way).step_by(way_count).map(|made| Ok(made.photo.clone())).collect();
+    Entry { label, stem: stem.to_owned(), photos }
+}
+
+fn grid_entry(targets: &[&Target], cell_count: usize) -> Entry {
+    let photos = targets.iter().map(|target| Ok(plain_grid(target, cell_count))).collect();
+    Entry { label: "plain grid of mean colours".to_owned(), stem: "grid".to_owned(), photos }
+}
+
+fn gimp_entry(brush: &str, targets: &[&Target], stroke_count: usize, mask: &Mask) -> Entry {
+    let paint =
+        |target: &&Target| gimp::paint(&photo_of(target), stroke_count, mask).map_err(|error| error.to_string());
+    let photos = if gimp::is_installed() {
+        targets.par_iter().map(paint).collect()
+    } else {
+        vec![Err(NO_GIMP.to_owned()); targets.len()]
+    };
+    Entry { label: format!("GIMPressionist, {brush} brush"), stem: format!("gimp-{brush}"), photos }
+}
+
+/// Writes the pictures of all entries; returns them in rows under their originals, and their likeness.
+fn present(
+    bench: &Workbench<'_>,
+    figure: &str,
+    targets: &[&Target],
+    entries: &[Entry],
+) -> Result<(PictureTable, FigureTable)> {
+    let names = bench.picture_names();
+    let mut originals = Vec::new();
+    for (target, name) in targets.iter().zip(&names) {
+        bench.folder.write_picture(&format!("{figure}/original/{name}.png"), &photo_of(target))?;
+        originals.push(super::grid::original_cell(figure, name));
+    }
+    let mut rows = vec![("original".to_owned(), originals)];
+    let mut table = FigureTable { head: heads(&["made by", "picture"]), rows: Vec::new() };
+    table.head.extend(heads(&LIKENESS));
+    for Entry { label, stem, photos } in entries {
+        let mut cells = Vec::new();
+        for ((photo, target), name) in photos.iter().zip(targets).zip(&names) {
+            let photo = match photo {
+                Ok(photo) => photo,
+                Err(why) => {
+                    cells.push(Cell::Missing(why.clone()));
+                    continue;
+                }
+            };
+            let likeness_of = score(target, photo)?;
+            let file = format!("{figure}/{stem}/{name}.png");
+            bench.folder.write_picture(&file, photo)?;
+            cells.push(cell(&file, &likeness_of));
+            table.rows.push([vec![label.clone(), name.clone()], likeness(&likeness_of)].concat());
+        }
+        rows.push((label.clone(), cells));
+    }
+    Ok((PictureTable { head: names, rows }, table))
+}
+
+/// The edges of the originals and of all entries.
+fn edges(bench: &Workbench<'_>, targets: &[&Target], entries: &[Entry]) -> Result<PictureTable> {
+    let names = bench.picture_names();
+    let row = |label: &str, stem: &str, photos: &[Option<&Photo>]| -> Result<(String, Vec<Cell>)> {
+        let cell = |(photo, name): (&Option<&Photo>, &String)| {
+            let Some(photo) = photo else { return Ok(Cell::Missing(String::new())) };
+            let file = format!("fig6/{stem}-edges/{name}.png");
+            bench.folder.write_picture(&file, &edge_picture(photo)?)?;
+            Ok(Cell::Picture { file, caption: name.clone() })
+        };
+        Ok((label.to_owned(), photos.iter().zip(&names).map(cell).collect::<Result<_>>()?))
+    };
+    let originals: Vec<Photo> = targets.iter().map(|target| photo_of(target)).collect();
+    let mut rows = vec![row("original", "original", &originals.iter().map(Some).collect::<Vec<_>>())?];
+    for Entry { label, stem, photos } in entries {
+        rows.push(row(label, stem, &photos.iter().map(|photo| photo.as_ref().ok()).collect::<Vec<_>>())?);
+    }
+    Ok(PictureTable { head: names, rows })
+}
+
+/// Black edges on white.
+fn edge_picture(photo: &Photo) -> Result<Photo> {
+    let Photo { width_px, height_px, pixels } = photo;
+    let picture = crate::metrics::Picture { width_px: *width_px, height_px: *height_px, pixels };
+    let edges = edge_pixels(picture).map_err(Error::Usage)?;
+    let pixels = edges.into_iter().map(|is_edge| [if is_edge { 0 } else { 255 }; 3]).collect();
+    Ok(Photo { width_px: *width_px, height_px: *height_px, pixels })
+}

@@ -1,0 +1,133 @@
+//! The paper's rival, GIMPressionist (GIMP's plug-in), run without a display where GIMP is installed (Figs 6 and 9).
+//!
+//! Everything that GIMP writes stays in a temporary folder of its own. GIMP ends with 0 even if a plug-in fails, so the
+//! picture alone tells whether it worked.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::error::{Error, Result};
+use crate::model::mask::{MASK_SIDE, Mask};
+use crate::photo::{self, Photo, ReadOptions};
+
+/// GIMP starts in seconds and paints in a few more.
+const TIME_LIMIT: Duration = Duration::from_secs(180);
+const PROGRAM: &str = "gimp";
+
+/// The script that GIMP runs: load, paint, save.
+const SCRIPT: &str = r"(define (smalti-paint in out preset)
+  (let* ((image (car (gimp-file-load RUN-NONINTERACTIVE in in)))
+         (drawable (car (gimp-image-get-active-layer image))))
+    (plug-in-gimpressionist RUN-NONINTERACTIVE image drawable preset)
+    (gimp-file-save RUN-NONINTERACTIVE image (car (gimp-image-flatten image)) out out)
+    (gimp-image-delete image)))
+";
+
+/// Whether GIMP is there to be run.
+pub(super) fn is_installed() -> bool {
+    let mut asked = Command::new(PROGRAM);
+    asked.arg("--version").stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    asked.status().is_ok_and(|status| status.success())
+}
+
+/// `picture` painted with about `stroke_count` strokes of a brush: the coverage of `mask`, as large and as dense as
+/// served the square brush best at 500 to 2,500 strokes.
+///
+/// # Errors
+/// [`Error::Internal`] with what GIMP did if no picture comes out.
+pub(super) fn paint(picture: &Photo, stroke_count: usize, mask: &Mask) -> Result<Photo> {
+    let folder = tempfile::tempdir().map_err(|error| failed(&format!("no temporary folder: {error}")))?;
+    let files = Files { folder: folder.path() };
+    files.prepare(picture, stroke_count, mask)?;
+    files.run()?;
+    let painted = photo::read(&files.folder.join("out.png"), &ReadOptions::default())
+        .map_err(|_| failed("it wrote no picture"))?
+        .photo;
+    if painted.pixels == picture.pixels {
+        return Err(failed("its plug-in gimpressionist changed nothing"));
+    }
+    Ok(painted)
+}
+
+fn failed(what: &str) -> Error {
+    Error::Internal(format!("GIMP did not paint: {what}"))
+}
+
+/// GIMP's folder, the picture and the result.
+struct Files<'a> {
+    folder: &'a Path,
+}
+
+impl Files<'_> {
+    fn prepare(&self, picture: &Photo, stroke_count: usize, mask: &Mask) -> Result<()> {
+        let side = f64::from(picture.width_px) * f64::from(picture.height_px) / stroke_count as f64;
+        let settings = settings(side.sqrt());
+        let files: [(&str, Vec<u8>); 4] = [
+            ("in.png", photo::encode_png(picture, &photo::Metadata::new())?),
+            ("scripts/smalti.scm", SCRIPT.as_bytes().to_vec()),
+            ("gimpressionist/Presets/smalti", settings.into_bytes()),
+            ("gimpressionist/Brushes/smalti.pgm", brush(mask)),
+        ];
+        for (name, bytes) in files {
+            let path = self.folder.join(name);
+            let folder = path.parent().unwrap_or(self.folder);
+            std::fs::create_dir_all(folder)
+                .and_then(|()| std::fs::write(&path, bytes))
+                .map_err(|error| failed(&format!("its folder cannot be written ({error})")))?;
+        }
+        Ok(())
+    }
+
+    fn run(&self) -> Result<()> {
+        let call = r#"(smalti-paint "in.png" "out.png" "smalti")"#;
+        let mut gimp = Command::new(PROGRAM)
+            .args(["-i", "-d", "-f", "-b", call, "-b", "(gimp-quit 0)"])
+            .current_dir(self.folder)
+            .env("GIMP2_DIRECTORY", self.folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(|error| failed(&format!("it does not start ({error})")))?;
+        let began = Instant::now();
+        loop {
+            match gimp.try_wait() {
+                Ok(Some(_)) => return Ok(()),
+                Ok(None) if began.elapsed() < TIME_LIMIT => std::thread::sleep(Duration::from_millis(50)),
+                outcome => {
+                    // It is given up; whether it could be ended changes nothing.
+                    let _ = gimp.kill();
+                    let _ = gimp.wait();
+                    let why =
+                        outcome.err().map_or("it took more than three minutes".to_owned(), |error| error.to_string());
+                    return Err(failed(&why));
+                }
+            }
+        }
+    }
+}
+
+/// The mask's coverage, a quarter as wide, as the grey picture that GIMPressionist takes for a brush.
+fn brush(mask: &Mask) -> Vec<u8> {
+    const STEP: usize = 4;
+    let side = MASK_SIDE / STEP;
+    let mut bytes = format!("P5\n{side} {side}\n255\n").into_bytes();
+    for row in (0..MASK_SIDE).step_by(STEP) {
+        let texels = (0..MASK_SIDE).step_by(STEP).map(|column| mask.texel(column as u32, row as u32));
+        bytes.extend(texels.map(|texel| texel.coverage));
+    }
+    bytes
+}
+
+/// A preset of GIMPressionist: strokes of one size laid evenly, turned along what they paint, without relief.
+fn settings(tile_side_px: f64) -> String {
+    // 7 px at 256x256 with 2,500 strokes, and in proportion.
+    let size = (1.37 * tile_side_px).round().max(1.0);
+    let density = 3.0 * ((std::f64::consts::SQRT_2 * size).ceil() + 1.0) / tile_side_px;
+    format!(
+        "Preset\norientnum=12\norientfirst=0.000000\norientlast=360.000000\norienttype=6\nsizenum=1\n\
+         sizefirst={size:.6}\nsizelast={size:.6}\nbrushdensity={density:.6}\nbrushrelief=0.000000\n\
+         generaldarkedge=0.000000\nselectedbrush=Brushes/smalti.pgm\ncolor=000000\nplacetype=1\n"
+    )
+}

@@ -1,0 +1,156 @@
+//! Figures 3 and 4: the random start, and the grid of pictures and schemes.
+
+use rayon::prelude::*;
+
+use super::page::{Cell, Content, FigureTable, Page, PictureTable};
+use super::pictures::{photo_of, plain_grid};
+use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness, spread};
+use crate::app::job::default_fly_count;
+use crate::app::presets::{Preset, Shaders};
+use crate::app::study::{Evolved, score};
+use crate::error::Result;
+use crate::metrics::Score;
+use crate::model::Canvas;
+use crate::photo::Photo;
+
+/// Side in px of a picture in the contact sheet of figure 4.
+const SHEET_CELL_PX: u32 = 256;
+
+/// Figure 3: what evolution begins with.
+pub(super) fn fig3(bench: &Workbench<'_>) -> Result<Page> {
+    let sizes = [Preset::paper(1), Preset::paper(3)];
+    let mut rows = Vec::new();
+    let mut figures = FigureTable { head: heads(&["picture", "size", "flies"]), rows: Vec::new() };
+    figures.head.extend(heads(&LIKENESS));
+    for preset in sizes {
+        let mut cells = Vec::new();
+        for picture in &bench.pictures {
+            let recipe = bench.recipe(picture, preset, &Tiles::default())?;
+            let first = recipe.first();
+            let photo = bench.study.draw(&recipe, &first, (&Canvas::evaluation(first.width_px, first.height_px), 1))?;
+            let score = score(&recipe.target, &photo)?;
+            let file = format!("fig3/{}-{}.png", picture.name, preset.side_px);
+            bench.folder.write_picture(&file, &photo)?;
+            cells.push(cell(&file, &score));
+            let size = format!("{}x{}", recipe.target.width_px(), recipe.target.height_px());
+            figures
+                .rows
+                .push([vec![picture.name.clone(), size, recipe.fly_count.to_string()], likeness(&score)].concat());
+        }
+        rows.push((format!("{} px", preset.side_px), cells));
+    }
+    let mut page = Page::new(
+        "Figure 3: the random start",
+        "Before the first birth every fly has a random place, depth, colour and angle; its sides are those of Eq. 1.",
+    );
+    page.push("First populations", Content::Pictures(PictureTable { head: bench.picture_names(), rows }));
+    page.push("Likeness to the target", Content::Figures(bench.write_table("fig3.csv", figures)?));
+    Ok(page)
+}
+
+/// Figure 4: originals in row 0, schemes in rows, pictures in columns.
+pub(super) fn fig4(bench: &Workbench<'_>) -> Result<Page> {
+    let presets: Vec<Preset> = Preset::all().collect();
+    let recipes = bench.recipes_of_all(|picture| {
+        presets.iter().map(|preset| bench.recipe(picture, *preset, &Tiles::default())).collect()
+    })?;
+    let evolved = bench.study.evolve(&recipes)?;
+    let row = |scheme: usize| (0..bench.pictures.len()).map(move |picture| picture * presets_count() + scheme);
+
+    let originals = bench.pictures.iter().map(|picture| picture.target(SHEET_CELL_PX, None).map(|t| photo_of(&t)));
+    let originals: Vec<Photo> = originals.collect::<Result<_>>()?;
+    let names = bench.picture_names();
+    let files: Vec<(String, &Photo)> = names
+        .iter()
+        .zip(&originals)
+        .map(|(name, photo)| (format!("fig4/original/{name}.png"), photo))
+        .chain(presets.iter().enumerate().flat_map(|(scheme, preset)| {
+            let (names, evolved) = (&names, &evolved);
+            row(scheme)
+                .zip(names)
+                .map(move |(k, name)| (format!("fig4/{}/{name}.png", preset.name()), &evolved[k].photo))
+        }))
+        .collect();
+    bench.write_pictures(&files)?;
+
+    let mut rows = vec![("original".to_owned(), names.iter().map(|name| original_cell("fig4", name)).collect())];
+    for (scheme, preset) in presets.iter().enumerate() {
+        let cells = row(scheme)
+            .zip(&names)
+            .map(|(k, name)| cell(&format!("fig4/{}/{name}.png", preset.name()), &evolved[k].score));
+        rows.push((describe(*preset), cells.collect()));
+    }
+    let mut sheet_rows = vec![originals.iter().map(Some).collect::<Vec<_>>()];
+    sheet_rows.extend((0..presets.len()).map(|scheme| row(scheme).map(|k| Some(&evolved[k].photo)).collect()));
+    bench.folder.write_picture("fig4/sheet.png", &crate::app::sheet::sheet(&sheet_rows, SHEET_CELL_PX)?)?;
+
+    let mut page = Page::new(
+        "Figure 4: the 12 schemes",
+        "Each column is a picture, each row a scheme of Table 1; row 0 has the originals. The figures are against the picture \
+         as it was evolved towards.",
+    );
+    page.push("Mosaics", Content::Pictures(PictureTable { head: names, rows }));
+    let table = fig4_figures(bench, &presets, &evolved)?;
+    page.push("Likeness", Content::Figures(bench.write_table("fig4.csv", table)?));
+    Ok(page)
+}
+
+/// Number of the paper's schemes.
+fn presets_count() -> usize {
+    Preset::all().count()
+}
+
+/// The cell of an original.
+pub(super) fn original_cell(figure: &str, name: &str) -> Cell {
+    Cell::Picture { file: format!("{figure}/original/{name}.png"), caption: name.to_owned() }
+}
+
+fn describe(preset: Preset) -> String {
+    let colors = preset.color_count.map_or("full colour".to_owned(), |count| format!("{count} colours"));
+    let shaders = match preset.shaders {
+        Shaders::One => "one shader",
+        Shaders::Two => "two shaders",
+        Shaders::OneThenTwo => "one, then two shaders",
+    };
+    format!("{}: {} px, {colors}, {shaders}", preset.name(), preset.side_px)
+}
+
+/// Per scheme and picture the likeness, and that of the plainest mosaic with as many tiles.
+fn fig4_figures(bench: &Workbench<'_>, presets: &[Preset], evolved: &[Evolved]) -> Result<FigureTable> {
+    let mut table = FigureTable { head: heads(&["scheme", "picture"]), rows: Vec::new() };
+    table.head.extend(heads(&LIKENESS));
+    table.head.extend(heads(&["SAE to the full-colour picture", "births", "Clark-Evans index"]));
+    for (k, evolved) in evolved.iter().enumerate() {
+        let (picture, preset) = (&bench.pictures[k / presets.len()], presets[k % presets.len()]);
+        let full = picture.target(preset.side_px, None)?;
+        let to_full = if preset.color_count.is_some() { score(&full, &evolved.photo)? } else { evolved.score };
+        let mut row = vec![preset.name(), picture.name.clone()];
+        row.extend(likeness(&evolved.score));
+        row.extend([to_full.difference.sae().to_string(), evolved.births.to_string(), spread(evolved)]);
+        table.rows.push(row);
+    }
+    let grids: Vec<(u32, usize)> =
+        [256, 512].iter().flat_map(|&px| (0..bench.pictures.len()).map(move |p| (px, p))).collect();
+    let rows: Vec<Result<Vec<String>>> = grids
+        .par_iter()
+        .map(|&(side_px, picture)| {
+            let picture = &bench.pictures[picture];
+            let (cell_count, score) = grid_score(picture, side_px)?;
+            let mut row = vec![format!("plain grid of {cell_count}, {side_px} px"), picture.name.clone()];
+            row.extend(likeness(&score));
+            row.extend([score.difference.sae().to_string(), "0".to_owned(), "none".to_owned()]);
+            Ok(row)
+        })
+        .collect();
+    for row in rows {
+        table.rows.push(row?);
+    }
+    Ok(table)
+}
+
+/// Likeness of the plain grid with as many cells as the preset of that size has flies.
+fn grid_score(picture: &super::pictures::Picture, side_px: u32) -> Result<(usize, Score)> {
+    let target = picture.target(side_px, None)?;
+    let fly_count = default_fly_count(target.width_px(), target.height_px());
+    Ok((fly_count, score(&target, &plain_grid(&target, fly_count))?))
+}

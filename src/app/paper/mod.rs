@@ -1,0 +1,193 @@
+//! `smalti paper`: the figures and tables of "Evolutionary Art using the Fly Algorithm", each by one command.
+//!
+//! Every figure is a page with its pictures, plots and tables (as CSV, too) in a folder that opens from disk. The results
+//! depend on the pictures, the births and the seed alone.
+
+mod colors;
+mod folder;
+mod gimp;
+mod grid;
+mod looks;
+mod page;
+mod pictures;
+mod restarts;
+mod tables;
+mod workbench;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+
+use super::cli::ProgressKind;
+use super::interrupt::Interrupt;
+use super::options::{self, Overwrite};
+use super::progress::Progress;
+use super::study::Study;
+use super::{device, report, run, values};
+use crate::error::{Error, Result};
+use crate::vk::Validation;
+use folder::Folder;
+use page::{Content, Page};
+use workbench::Workbench;
+
+const EXAMPLES: &str = "\
+Examples:
+  smalti paper fig4 --images photos -o figures
+  smalti paper all --images photos -o figures --births 4k      # a quick look";
+
+/// The flags.
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(super) struct PaperArgs {
+    /// What to make: a figure or table of the paper, or all of them
+    #[arg(value_enum, value_name = "NAME")]
+    pub name: Name,
+    /// Folder with the pictures, PNG or JPEG or any other kind that is read; tables 1 and 2 and figure 7 need none
+    #[arg(long, value_name = "DIR")]
+    pub images: Option<PathBuf>,
+    /// Folder for the page and what belongs to it; created if it is missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Births of each run (suffixes k, M); fewer for a quick look
+    #[arg(long, value_name = "B", value_parser = values::count, default_value = "40k")]
+    pub births: u64,
+    /// Number that decides every random choice
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub seed: u64,
+    /// Write into a folder that holds other files, too
+    #[arg(long)]
+    pub force: bool,
+    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
+    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
+    pub device: String,
+    /// CPU threads, 1 to 1,024; changes no result [default: all]
+    #[arg(long, value_name = "T", value_parser = values::count)]
+    pub threads: Option<u64>,
+    /// How to show progress on stderr
+    #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
+    pub progress: ProgressKind,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Name {
+    /// The random start
+    Fig3,
+    /// The 12 schemes on all pictures
+    Fig4,
+    /// Restarts, and the curve of global fitness
+    Fig5,
+    /// Colours evolved or picked, and edges
+    Fig6,
+    /// The templates of tiles
+    Fig7,
+    /// Shaders, large tiles, no rotation, tiles with an edge
+    Fig8,
+    /// Tile types beside GIMPressionist
+    Fig9,
+    /// The 12 schemes
+    Table1,
+    /// The parameters
+    Table2,
+    /// Everything, with an index
+    All,
+}
+
+impl Name {
+    /// The name, as it is typed.
+    fn word(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// Whether it shows what becomes of pictures.
+    fn needs_pictures(self) -> bool {
+        !matches!(self, Self::Fig7 | Self::Table1 | Self::Table2)
+    }
+
+    fn make(self, bench: &Workbench<'_>) -> Result<Page> {
+        match self {
+            Self::Fig3 => grid::fig3(bench),
+            Self::Fig4 => grid::fig4(bench),
+            Self::Fig5 => restarts::fig5(bench),
+            Self::Fig6 => colors::fig6(bench),
+            Self::Fig7 => looks::fig7(bench),
+            Self::Fig8 => looks::fig8(bench),
+            Self::Fig9 => colors::fig9(bench),
+            Self::Table1 => tables::table1(bench),
+            Self::Table2 => tables::table2(bench),
+            Self::All => all(bench),
+        }
+    }
+}
+
+/// Makes what was asked for; the exit code of the process.
+pub(super) fn make(args: &PaperArgs) -> ExitCode {
+    match try_make(args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            report::error(&error.to_string());
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn try_make(args: &PaperArgs) -> Result<()> {
+    let interrupt = Interrupt::listen()?;
+    run::start_threads(options::thread_count(args.threads)?)?;
+    let images = match &args.images {
+        None if args.name.needs_pictures() => {
+            return Err(Error::Usage("this figure needs pictures; name their folder with --images".to_owned()));
+        }
+        Some(folder) if args.name.needs_pictures() => pictures::in_folder(folder, workbench::SIDE_MAX_PX)?,
+        _ => Vec::new(),
+    };
+    let overwrite = if args.force { Overwrite::Force } else { Overwrite::Refuse };
+    let folder = Folder::open(&args.output, overwrite)?;
+    let device = device::select(&options::device(&args.device)?, Validation::Off)?;
+    if !args.quiet {
+        report::say_device(&device);
+    }
+    let quiet = args.quiet && args.progress == ProgressKind::Auto;
+    let progress = Progress::new(if quiet { ProgressKind::None } else { args.progress });
+    let began = Instant::now();
+    let study = Study::new(&device, &interrupt, progress);
+    let bench = Workbench { study: &study, pictures: images, folder, births: args.births, seed: args.seed };
+    let made = write_page(&bench, args.name);
+    study.finish();
+    let path = made?;
+    if !args.quiet {
+        report::say(&format!("wrote {} in {:.1} s", path.display(), began.elapsed().as_secs_f64()));
+    }
+    Ok(())
+}
+
+/// Makes a page and writes it; returns its path.
+fn write_page(bench: &Workbench<'_>, name: Name) -> Result<PathBuf> {
+    let page = name.make(bench)?;
+    let word = if name == Name::All { "index".to_owned() } else { name.word() };
+    let command = format!("smalti paper {} --births {} --seed {}", name.word(), bench.births, bench.seed);
+    bench.folder.write_page(&word, &page, &command)?;
+    Ok(bench.folder.path(&format!("{word}.html")))
+}
+
+/// All pages, and one that leads to them.
+fn all(bench: &Workbench<'_>) -> Result<Page> {
+    let mut index = Page::new(
+        "Evolutionary Art using the Fly Algorithm, reproduced",
+        "Every table and figure of the paper that shows a result. Figures 1 and 2 are diagrams; they are in the documentation.",
+    );
+    let mut links = Vec::new();
+    for name in Name::value_variants().iter().copied().filter(|name| *name != Name::All) {
+        let page = name.make(bench)?;
+        let file = format!("{}.html", name.word());
+        let command = format!("smalti paper {} --births {} --seed {}", name.word(), bench.births, bench.seed);
+        bench.folder.write_page(&name.word(), &page, &command)?;
+        links.push((file, page.title));
+    }
+    index.push("Pages", Content::Links(links));
+    Ok(index)
+}

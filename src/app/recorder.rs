@@ -1,0 +1,188 @@
+//! Keeps the course of an evolution: snapshots of its best population, encoded and written while it goes on.
+//!
+//! Births alone decide when a snapshot is taken, never the clock, so the same command leaves the same files on every
+//! machine. A thread of its own encodes and writes; the evolution copies its flies and waits only if that thread falls
+//! behind, so memory stays flat.
+
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+use serde_json::{Map, Value};
+
+use super::snapshots::SaveRun;
+use crate::archive;
+use crate::error::{Error, Result};
+use crate::evolve::Evolution;
+use crate::model::{Fly, Population};
+use crate::output;
+
+/// Snapshots that may wait to be written.
+const QUEUE_LENGTH: usize = 2;
+/// The first snapshots lie this share of their births apart: the picture changes fastest at the beginning.
+const EARLY_SHARE: u64 = 32;
+/// And at least this share of the births between later ones.
+const EARLY_LEAST_SHARE: u64 = 64;
+
+/// A population that the evolution passed through.
+struct Passed {
+    births: u64,
+    run: u32,
+    sae: u64,
+    flies: Vec<Fly>,
+}
+
+/// Takes the snapshots of one evolution.
+#[derive(Debug)]
+pub(super) struct Recorder {
+    save_run: SaveRun,
+    /// Births between two snapshots, but at the beginning.
+    every: u64,
+    /// Births from which the next one is due.
+    due: u64,
+    /// Births of the last one.
+    last: Option<u64>,
+    /// Run of the last generation.
+    run: u32,
+    queue: Option<SyncSender<Passed>>,
+    writer: Option<JoinHandle<Result<()>>>,
+    /// What the writer came to.
+    written: Result<()>,
+}
+
+impl Recorder {
+    /// Prepares the folder and begins to record. `stage` is the population without its flies; `told` is what all
+    /// snapshots tell.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if the folder cannot be made ready.
+    pub(super) fn begin(
+        save_run: &SaveRun,
+        births_planned: u64,
+        stage: Population,
+        told: Map<String, Value>,
+    ) -> Result<Self> {
+        save_run.prepare(told.get("key").and_then(Value::as_str).unwrap_or_default())?;
+        let (queue, passed) = sync_channel::<Passed>(QUEUE_LENGTH);
+        let writing = save_run.clone();
+        let writer = std::thread::Builder::new().name("snapshots".to_owned()).spawn(move || {
+            let mut population = stage;
+            passed.into_iter().try_for_each(|passed| write(&writing, &mut population, &told, passed))
+        });
+        let writer = writer.map_err(|error| {
+            Error::output(&save_run.folder, format!("no thread can be started to write to it ({error})"))
+        })?;
+        Ok(Self {
+            save_run: save_run.clone(),
+            every: save_run.births_between(births_planned),
+            due: 0,
+            last: None,
+            run: 0,
+            queue: Some(queue),
+            writer: Some(writer),
+            written: Ok(()),
+        })
+    }
+
+    /// Looks at the evolution after a generation, and takes a snapshot if one is due or a run has ended.
+    pub(super) fn note(&mut self, evolution: &Evolution) {
+        let outcome = evolution.outcome();
+        if outcome.births >= self.due || outcome.restarts != self.run {
+            self.take(evolution);
+            self.due = next_due(outcome.births, self.every);
+        }
+        self.run = outcome.restarts;
+    }
+
+    /// Takes the last snapshot and waits until all are written.
+    pub(super) fn finish(&mut self, evolution: &Evolution) {
+        self.take(evolution);
+        self.queue = None;
+        if let Some(writer) = self.writer.take() {
+            let ended = |_| Err(Error::Internal("the thread that writes snapshots ended".to_owned()));
+            self.written = writer.join().unwrap_or_else(ended);
+        }
+    }
+
+    /// The folder, if all snapshots are in it; to be asked after [`Recorder::finish`].
+    ///
+    /// # Errors
+    /// The first snapshot that could not be written.
+    pub(super) fn outcome(self) -> Result<String> {
+        self.written.map(|()| self.save_run.folder.display().to_string())
+    }
+
+    fn take(&mut self, evolution: &Evolution) {
+        let births = evolution.outcome().births;
+        // No birth, no other best population: what is due and the end of a run may fall together.
+        if self.last.replace(births) == Some(births) {
+            return;
+        }
+        let sae = evolution.best_sae().unwrap_or_default();
+        let passed = Passed { births, run: self.run, sae, flies: evolution.best_flies().to_vec() };
+        // The writer ends at the first failure, which `outcome` tells; the evolution is worth more than its snapshots.
+        self.queue = self.queue.take().filter(|queue| queue.send(passed).is_ok());
+    }
+}
+
+/// Births from which the next snapshot is due after one at `births`: at every multiple of `every`, and closer together
+/// while a 32nd of the births is less than that.
+fn next_due(births: u64, every: u64) -> u64 {
+    let early = (births / EARLY_SHARE).clamp((every / EARLY_LEAST_SHARE).max(1), every);
+    let multiple = (births / every).saturating_add(1).saturating_mul(every);
+    multiple.min(births.saturating_add(early))
+}
+
+fn write(save_run: &SaveRun, population: &mut Population, told: &Map<String, Value>, passed: Passed) -> Result<()> {
+    let mut told = told.clone();
+    told.insert("status".to_owned(), "snapshot".into());
+    told.insert("births".to_owned(), passed.births.into());
+    told.insert("run".to_owned(), passed.run.into());
+    told.insert("sae".to_owned(), passed.sae.into());
+    told.sort_keys();
+    population.flies = passed.flies;
+    output::write_atomically_soon(&save_run.path_of(passed.births), &archive::encode_snapshot(population, &told)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evolve::PaperScheme;
+    use crate::evolve::evolution::random_population;
+    use crate::model::MaskSet;
+
+    fn dues(every: u64, births: u64) -> Vec<u64> {
+        std::iter::successors(Some(0), |&due| Some(next_due(due, every))).take_while(|&due| due <= births).collect()
+    }
+
+    #[test]
+    fn snapshots_come_at_every_multiple_and_closer_together_at_the_beginning() {
+        let dues = dues(4_000, 400_000);
+        assert!((1..=100).all(|k| dues.contains(&(k * 4_000))));
+        assert!(dues.windows(2).all(|pair| pair[1] - pair[0] <= (pair[0] / 32).clamp(62, 4_000)));
+        assert!(dues.iter().filter(|&&due| due > 128_000).all(|due| due % 4_000 == 0));
+        assert!((230..=260).contains(&dues.len()), "{}", dues.len());
+    }
+
+    #[test]
+    fn few_births_are_all_kept_and_many_do_not_overflow() {
+        assert_eq!(dues(1, 5), [0, 1, 2, 3, 4, 5]);
+        assert_eq!(next_due(u64::MAX - 1, u64::MAX), u64::MAX);
+        assert_eq!(next_due(u64::MAX, 3), u64::MAX);
+    }
+
+    #[test]
+    fn a_snapshot_that_cannot_be_written_is_told_at_the_end_and_stops_nothing() {
+        let workshop = tempfile::tempdir().expect("a temporary folder");
+        let folder = workshop.path().join("run");
+        let save_run = SaveRun::new(&folder, Some(1)).expect("it is fine");
+        let stage =
+            Population { width_px: 9, height_px: 9, background: [0; 3], masks: MaskSet::default(), flies: Vec::new() };
+        let mut recorder = Recorder::begin(&save_run, 10, stage, Map::new()).expect("the folder is made");
+        std::fs::remove_dir(&folder).expect("it is empty");
+        let evolution = Evolution::new(PaperScheme::default(), 0, 9, 9, random_population(9, 9, 5, 0));
+        recorder.note(&evolution);
+        recorder.finish(&evolution);
+        let sentence = recorder.outcome().expect_err("there is no folder").to_string();
+        assert!(sentence.contains("000000000000.npz: its folder does not exist"), "{sentence}");
+    }
+}

@@ -1,0 +1,197 @@
+//! The folder of a run: one population for each snapshot, named by the births before it.
+//!
+//! Names and metadata tell all, so there is no index that could disagree with the files. All snapshots of one key lie on
+//! one course of births; a folder may therefore hold those of a run that was cut beside those of its repetition.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::options::{Overwrite, in_range};
+use super::provenance::SOFTWARE;
+use crate::archive;
+use crate::error::{Error, Result};
+
+/// Least digits of the births in a name: names sort like their births up to a trillion.
+const NAME_DIGITS: usize = 12;
+/// The planned births are kept in so many equal steps, unless asked otherwise. With the closer snapshots of the
+/// beginning, that makes about 240.
+const STEP_COUNT: u64 = 100;
+
+/// Where, and how often, the snapshots of an evolution are kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct SaveRun {
+    /// The folder, as the user wrote it.
+    pub folder: PathBuf,
+    /// Births between two snapshots.
+    every: Option<u64>,
+}
+
+/// A snapshot in a folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Snapshot {
+    pub path: PathBuf,
+    /// Births before it, of all runs.
+    pub births: u64,
+    /// Global fitness of the best population at that time.
+    pub sae: u64,
+    /// Key of the evolution that it belongs to.
+    pub key: String,
+}
+
+impl SaveRun {
+    /// Snapshots in `folder`, `every` so many births.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if `every` is 0.
+    pub(super) fn new(folder: &Path, every: Option<u64>) -> Result<Self> {
+        let every = every.map(|births| in_range("--save-every", births, (1, u64::MAX))).transpose()?;
+        Ok(Self { folder: folder.to_owned(), every })
+    }
+
+    /// Births between two snapshots of an evolution of so many births.
+    pub(super) fn births_between(&self, births_planned: u64) -> u64 {
+        self.every.unwrap_or_else(|| births_planned.div_ceil(STEP_COUNT)).max(1)
+    }
+
+    /// Checks that the folder is empty, missing, or one of the evolution with this key.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if something else is in it, unless that may be overwritten; [`Error::Output`] if it is no folder.
+    pub(super) fn check(&self, key: &str, overwrite: Overwrite) -> Result<()> {
+        let contents = contents(&self.folder).map_err(|error| self.unusable(&error))?;
+        if overwrite == Overwrite::Force {
+            return Ok(());
+        }
+        let why = if contents.snapshots.is_empty() && contents.has_others {
+            "holds files that are no snapshots"
+        } else if contents.snapshots.iter().any(|path| key_of(path).as_deref() != Some(key)) {
+            "holds snapshots of another evolution"
+        } else {
+            return Ok(());
+        };
+        let folder = self.folder.display();
+        Err(Error::Usage(format!("{folder} {why}; name another folder, or use this one with --force")))
+    }
+
+    /// Makes the folder ready for the evolution with this key: creates it, and removes snapshots of others, which
+    /// [`SaveRun::check`] has allowed. Files that are no snapshots of smalti stay, whatever their names.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub(super) fn prepare(&self, key: &str) -> Result<()> {
+        let prepare = || {
+            fs::create_dir_all(&self.folder)?;
+            let others = contents(&self.folder)?.snapshots.into_iter();
+            others.filter(|path| key_of(path).is_some_and(|found| found != key)).try_for_each(fs::remove_file)
+        };
+        prepare().map_err(|error| self.unusable(&error))
+    }
+
+    /// The file of the snapshot after so many births.
+    pub(super) fn path_of(&self, births: u64) -> PathBuf {
+        self.folder.join(format!("{births:0NAME_DIGITS$}.npz"))
+    }
+
+    fn unusable(&self, error: &io::Error) -> Error {
+        Error::output(&self.folder, format!("cannot be used as a folder for snapshots ({error}); name another one"))
+    }
+}
+
+/// The snapshots in `folder`, in the order of their births.
+///
+/// # Errors
+/// [`Error::Input`] if the folder cannot be read, holds none, one that does not tell its SAE, or those of more than one
+/// evolution.
+pub(super) fn list(folder: &Path) -> Result<Vec<Snapshot>> {
+    let unreadable = |error: io::Error| Error::input(folder, format!("cannot be read as a folder ({error})"));
+    // A missing folder is no empty one here.
+    fs::read_dir(folder).map_err(unreadable)?;
+    let found = contents(folder).map_err(unreadable)?.snapshots.into_iter();
+    let mut snapshots = found.map(read).collect::<Result<Vec<_>>>()?;
+    snapshots.sort_by_key(|snapshot| snapshot.births);
+    let Some(first) = snapshots.first() else {
+        let reason = "holds no snapshots; make some with smalti evolve --save-run";
+        return Err(Error::input(folder, reason));
+    };
+    if snapshots.iter().any(|snapshot| snapshot.key != first.key) {
+        return Err(Error::input(folder, "holds snapshots of more than one evolution; keep those of one"));
+    }
+    Ok(snapshots)
+}
+
+/// What is in a folder.
+#[derive(Debug, Default)]
+struct Contents {
+    /// Files whose names are those of snapshots.
+    snapshots: Vec<PathBuf>,
+    /// Whether anything else is there that is not hidden.
+    has_others: bool,
+}
+
+fn contents(folder: &Path) -> io::Result<Contents> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Contents::default()),
+        entries => entries?,
+    };
+    let mut contents = Contents::default();
+    for entry in entries {
+        let path = entry?.path();
+        if births_of(&path).is_some() {
+            contents.snapshots.push(path);
+        } else {
+            let name = path.file_name().unwrap_or_default().as_encoded_bytes();
+            contents.has_others |= !name.starts_with(b".");
+        }
+    }
+    Ok(contents)
+}
+
+/// The births in the name of a snapshot; none for any other name.
+fn births_of(path: &Path) -> Option<u64> {
+    let digits = path.file_name()?.to_str()?.strip_suffix(".npz")?;
+    let is_name = digits.len() >= NAME_DIGITS && digits.bytes().all(|byte| byte.is_ascii_digit());
+    digits.parse().ok().filter(|_| is_name)
+}
+
+/// The key of the evolution that the snapshot at `path` belongs to, if it is one.
+fn key_of(path: &Path) -> Option<String> {
+    read(path.to_owned()).ok().map(|snapshot| snapshot.key)
+}
+
+fn read(path: PathBuf) -> Result<Snapshot> {
+    let told = archive::read_meta(&path)?;
+    let text = |key| told.get(key).and_then(Value::as_str);
+    let number = |key| told.get(key).and_then(Value::as_u64);
+    let is_ours = text("software") == Some(SOFTWARE) && number("births") == births_of(&path);
+    match (text("key"), number("births"), number("sae")) {
+        (Some(key), Some(births), Some(sae)) if is_ours => Ok(Snapshot { births, sae, key: key.to_owned(), path }),
+        _ => Err(Error::input(&path, "is no snapshot of smalti evolve --save-run; remove it from the folder")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_the_births_and_sort_like_them() {
+        let save_run = SaveRun::new(Path::new("run"), None).expect("the default is fine");
+        let names: Vec<PathBuf> = [0, 7, 12_000, 999_999_999_999].map(|births| save_run.path_of(births)).into();
+        assert_eq!(names[2], Path::new("run/000000012000.npz"));
+        assert!(names.is_sorted());
+        assert_eq!(births_of(&save_run.path_of(u64::MAX)), Some(u64::MAX));
+        for name in ["run/12000.npz", "run/+00000012000.npz", "run/000000012000.png", "run/a00000012000.npz"] {
+            assert_eq!(births_of(Path::new(name)), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn the_default_covers_all_planned_births_in_a_hundred_steps() {
+        let every = |asked, planned| SaveRun::new(Path::new("run"), asked).map(|run| run.births_between(planned)).ok();
+        assert_eq!([every(None, 40_000), every(None, 40_001)], [Some(400), Some(401)]);
+        assert_eq!([every(None, 0), every(Some(7), 40_000), every(Some(0), 40_000)], [Some(1), Some(7), None]);
+    }
+}

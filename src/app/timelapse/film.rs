@@ -1,0 +1,83 @@
+//! One output of a timelapse while it grows: a temporary file, and what encodes into it.
+
+use std::fs::File;
+use std::io::{self, BufWriter};
+
+use super::ffmpeg::{Codec, Ffmpeg};
+use super::options::{AnimationFile, AnimationFormat};
+use super::provenance::AnimationProvenance;
+use crate::error::{Error, Result};
+use crate::model::{Canvas, Mosaic};
+use crate::output::PartialFile;
+use crate::photo::{ApngEncoder, GifEncoder, Timing};
+
+/// An animation that grows frame by frame. Dropped before its end, it leaves nothing.
+pub(super) struct Film {
+    encoder: Encoder,
+    // After the encoder, which may still write to it.
+    file: PartialFile,
+}
+
+enum Encoder {
+    Apng(ApngEncoder<BufWriter<File>>),
+    Gif(GifEncoder<BufWriter<File>>),
+    Ffmpeg(Ffmpeg),
+}
+
+impl Film {
+    /// Begins an animation.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if it cannot be written, or the program that it needs is missing.
+    pub(super) fn open(
+        output: &AnimationFile,
+        canvas: &Canvas,
+        timing: Timing,
+        provenance: &AnimationProvenance,
+    ) -> Result<Self> {
+        let file = PartialFile::create(&output.path)?;
+        let size_px = (canvas.width_px, canvas.height_px);
+        let metadata = provenance.metadata();
+        let writer = || file.writer().map(BufWriter::new);
+        let failed = |error: io::Error| file.failure(&error);
+        let ffmpeg = |codec| Ffmpeg::start(output, codec, file.growing_path(), size_px, (timing, &provenance.text));
+        let encoder = match output.format {
+            AnimationFormat::Apng => {
+                Encoder::Apng(ApngEncoder::new(writer()?, size_px, timing, &metadata).map_err(failed)?)
+            }
+            AnimationFormat::Gif => {
+                Encoder::Gif(GifEncoder::new(writer()?, size_px, timing, &metadata).map_err(failed)?)
+            }
+            AnimationFormat::Mp4 => Encoder::Ffmpeg(ffmpeg(Codec::H264)?),
+            AnimationFormat::WebM => Encoder::Ffmpeg(ffmpeg(Codec::Vp9)?),
+        };
+        Ok(Self { encoder, file })
+    }
+
+    /// Adds the next frame.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub(super) fn add(&mut self, frame: &Mosaic) -> Result<()> {
+        let failed = |error: io::Error| self.file.failure(&error);
+        match &mut self.encoder {
+            Encoder::Apng(encoder) => encoder.add(&frame.pixels).map_err(failed),
+            Encoder::Gif(encoder) => encoder.add(&frame.pixels).map_err(failed),
+            Encoder::Ffmpeg(ffmpeg) => ffmpeg.add(frame),
+        }
+    }
+
+    /// Ends the animation; the file is whole, and only needs its name.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub(super) fn finish(self) -> Result<PartialFile> {
+        let Self { encoder, file } = self;
+        let finished: Result<(), Error> = match encoder {
+            Encoder::Apng(encoder) => encoder.finish().map_err(|error| file.failure(&error)),
+            Encoder::Gif(encoder) => encoder.finish().map_err(|error| file.failure(&error)),
+            Encoder::Ffmpeg(ffmpeg) => ffmpeg.finish(),
+        };
+        finished.map(|()| file)
+    }
+}

@@ -1,0 +1,102 @@
+//! Which snapshots become frames.
+
+use clap::ValueEnum;
+
+use crate::app::snapshots::Snapshot;
+
+/// What is even from frame to frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(in crate::app) enum Spacing {
+    /// The ratio of the errors: the picture changes about as much with every frame
+    Error,
+    /// The number of births: fast at first, then slow
+    Births,
+    /// Nothing: every snapshot is a frame, and --frames takes every so many
+    Snapshots,
+}
+
+/// Indices of the snapshots to show, rising: the first and the last, and between them those that come nearest to an
+/// even course in `frame_count` frames. No snapshot is shown twice, so there may be fewer frames.
+///
+/// The error falls by a factor rather than by a difference: the eye sees the last 1 % of it go as it sees the first.
+/// Unless asked for more, that makes half as many frames as there are snapshots, since they are too far apart for more
+/// where the error falls fastest.
+pub(super) fn choose(snapshots: &[Snapshot], spacing: Spacing, frame_count: Option<usize>) -> Vec<usize> {
+    let place = |(index, snapshot): (usize, &Snapshot)| match spacing {
+        Spacing::Snapshots => index as f64,
+        Spacing::Births => snapshot.births as f64,
+        // From libm, since frames are a matter of bytes.
+        Spacing::Error => -libm::log(snapshot.sae as f64 + 1.0),
+    };
+    let places: Vec<f64> = snapshots.iter().enumerate().map(place).collect();
+    let (Some(&begin), Some(&end)) = (places.first(), places.last()) else { return Vec::new() };
+    let usual = match spacing {
+        Spacing::Error => snapshots.len().div_ceil(2),
+        Spacing::Births | Spacing::Snapshots => snapshots.len(),
+    };
+    let steps = frame_count.unwrap_or(usual).max(1) - 1;
+    let mut chosen: Vec<usize> = Vec::new();
+    for step in 0..steps {
+        let wanted = begin + (end - begin) * step as f64 / steps as f64;
+        let index = nearest(&places, wanted);
+        if chosen.last().is_none_or(|&last| index > last) {
+            chosen.push(index);
+        }
+    }
+    // What stands where the end stands is the same picture.
+    while chosen.last().is_some_and(|&last| places[last] >= end) && chosen.len() > 1 {
+        chosen.pop();
+    }
+    if chosen.last() != Some(&(places.len() - 1)) {
+        chosen.push(places.len() - 1);
+    }
+    chosen
+}
+
+/// The index of the place nearest to `wanted`, of equals the first; `places` never fall.
+fn nearest(places: &[f64], wanted: f64) -> usize {
+    let after = places.partition_point(|&place| place < wanted).min(places.len() - 1);
+    let before = after.saturating_sub(1);
+    let index = if wanted - places[before] <= places[after] - wanted { before } else { after };
+    places.partition_point(|&place| place < places[index])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+
+    fn course(saes: &[u64]) -> Vec<Snapshot> {
+        let snapshot = |(births, &sae)| Snapshot { path: PathBuf::new(), births, sae, key: String::new() };
+        (0..).zip(saes).map(snapshot).collect()
+    }
+
+    #[test]
+    fn births_are_evenly_thinned_and_both_ends_stay() {
+        let snapshots = course(&[9; 101]);
+        assert_eq!(choose(&snapshots, Spacing::Births, Some(5)), [0, 25, 50, 75, 100]);
+        assert_eq!(choose(&snapshots, Spacing::Snapshots, Some(5)), [0, 25, 50, 75, 100]);
+        assert_eq!(choose(&snapshots, Spacing::Births, Some(2)), [0, 100]);
+        assert_eq!(choose(&snapshots, Spacing::Births, Some(1)), [100]);
+        assert_eq!(choose(&snapshots, Spacing::Births, None).len(), 101);
+        assert_eq!(choose(&snapshots, Spacing::Births, Some(1000)).len(), 101);
+    }
+
+    #[test]
+    fn the_error_falls_by_the_same_factor_with_every_frame() {
+        let saes: Vec<u64> = (0..=1000).map(|birth| 1_000_000 / (1 + birth)).collect();
+        let snapshots = course(&saes);
+        let chosen = choose(&snapshots, Spacing::Error, Some(11));
+        let ratios: Vec<f64> = chosen.windows(2).map(|pair| saes[pair[0]] as f64 / saes[pair[1]] as f64).collect();
+        assert_eq!((chosen[0], chosen.last()), (0, Some(&1000)));
+        assert!(ratios.iter().all(|ratio| (1.9..2.1).contains(ratio)), "{ratios:?}");
+    }
+
+    #[test]
+    fn a_picture_that_does_not_change_is_shown_once() {
+        assert_eq!(choose(&course(&[9, 9, 5, 5, 5, 3, 3]), Spacing::Error, Some(7)), [0, 2, 6]);
+        assert_eq!(choose(&course(&[9, 9, 9]), Spacing::Error, Some(3)), [0, 2]);
+        assert_eq!(choose(&course(&[9]), Spacing::Error, Some(7)), [0]);
+    }
+}

@@ -1,0 +1,299 @@
+//! Animations frame by frame: APNG without loss, and GIF. Memory does not grow with the number of frames, and the same
+//! frames give the same bytes.
+//!
+//! Only the box around the pixels that changed is stored, and in it every pixel that did not change is transparent. That
+//! is smaller, and in a GIF also finer: each frame has a palette for its changed pixels alone, and what stays the same
+//! does not flicker.
+
+use std::collections::HashMap;
+use std::io::{self, Write};
+
+use gif::{DisposalMethod, Frame, Repeat};
+use png::{BlendOp, DeflateCompression};
+
+use super::Photo;
+use super::metadata::Metadata;
+use super::palette::{COLOR_COUNT_MAX, nearest, palette_of};
+
+/// Most frames a second of a GIF: viewers show shorter delays as a tenth of a second.
+pub const GIF_FRAMES_PER_S_MAX: u16 = 50;
+/// Deflate level of the frames, 1 to 9.
+const LEVEL: u8 = 6;
+/// Most bytes of a block of a GIF.
+const GIF_BLOCK_BYTES: usize = 255;
+/// The label of comments in a GIF.
+const GIF_COMMENT: u8 = 0xFE;
+
+/// How many frames an animation has, and when it shows them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    /// Number of frames, at least 1.
+    pub frame_count: u32,
+    /// Frames a second, at least 1; a GIF has at most [`GIF_FRAMES_PER_S_MAX`].
+    pub frames_per_s: u16,
+    /// Time that the last frame is shown, in hundredths of a second.
+    pub last_cs: u16,
+    /// How often the animation is shown; 0 is without end.
+    pub plays: u16,
+}
+
+impl Timing {
+    /// Hundredths of a second that frame `index` of a GIF is shown: rounded so that no error adds up.
+    fn delay_cs(&self, index: u32) -> u16 {
+        if index + 1 == self.frame_count {
+            return self.last_cs;
+        }
+        let begin_cs = |index: u64| (index * 200 / u64::from(self.frames_per_s)).div_ceil(2);
+        (begin_cs(u64::from(index) + 1) - begin_cs(u64::from(index))) as u16
+    }
+}
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Area {
+    x: usize,
+    y: usize,
+    width_px: usize,
+    height_px: usize,
+}
+
+/// What changed from the frame before.
+struct Changes {
+    area: Area,
+    /// The pixels of the area, row by row; none where nothing changed.
+    pixels: Vec<Option<[u8; 3]>>,
+}
+
+/// The frame before, to tell what changes.
+#[derive(Debug)]
+struct Screen {
+    width_px: usize,
+    shown: Vec<[u8; 3]>,
+}
+
+impl Screen {
+    fn new(width_px: u32) -> Self {
+        Self { width_px: width_px as usize, shown: Vec::new() }
+    }
+
+    /// Shows `pixels`; what changed, at least one pixel's area, and on the first frame everything.
+    fn show(&mut self, pixels: &[[u8; 3]]) -> Changes {
+        let is_first = self.shown.is_empty();
+        let has_changed = |place: &usize| is_first || self.shown[*place] != pixels[*place];
+        let area = self.bounds((0..pixels.len()).filter(has_changed));
+        let rows = (area.y..area.y + area.height_px).map(|y| y * self.width_px + area.x);
+        let places = rows.flat_map(|start| start..start + area.width_px);
+        let pixel = |place| has_changed(&place).then_some(pixels[place]);
+        let changes = Changes { area, pixels: places.map(pixel).collect() };
+        self.shown.clear();
+        self.shown.extend_from_slice(pixels);
+        changes
+    }
+
+    /// The least area around some places; a pixel in the corner if there are none.
+    fn bounds(&self, places: impl Iterator<Item = usize>) -> Area {
+        let around = |bounds: Option<[usize; 4]>, place: usize| {
+            let (x, y) = (place % self.width_px, place / self.width_px);
+            let [left, top, right, bottom] = bounds.unwrap_or([x, y, x, y]);
+            Some([left.min(x), top.min(y), right.max(x), bottom.max(y)])
+        };
+        let [left, top, right, bottom] = places.fold(None, around).unwrap_or_default();
+        Area { x: left, y: top, width_px: right - left + 1, height_px: bottom - top + 1 }
+    }
+}
+
+/// Writes an animated PNG: 8-bit sRGB, exactly the frames.
+pub struct ApngEncoder<W: Write> {
+    writer: png::Writer<W>,
+    screen: Screen,
+    timing: Timing,
+    next: u32,
+}
+
+impl<W: Write> ApngEncoder<W> {
+    /// Begins an animation of frames of `size_px`, width and height.
+    ///
+    /// # Errors
+    /// If `out` cannot be written, or a number is 0 that must not be.
+    pub fn new(out: W, size_px: (u32, u32), timing: Timing, metadata: &Metadata) -> io::Result<Self> {
+        let mut encoder = png::Encoder::new(out, size_px.0, size_px.1);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        encoder.set_deflate_compression(DeflateCompression::Level(LEVEL));
+        encoder.set_filter(png::Filter::Adaptive);
+        encoder.validate_sequence(true);
+        encoder.set_animated(timing.frame_count, u32::from(timing.plays))?;
+        encoder.set_frame_delay(1, timing.frames_per_s)?;
+        for (keyword, text) in metadata.iter().cloned() {
+            encoder.add_itxt_chunk(keyword, text)?;
+        }
+        Ok(Self { writer: encoder.write_header()?, screen: Screen::new(size_px.0), timing, next: 0 })
+    }
+
+    /// Adds the next frame, row by row from the top.
+    ///
+    /// # Errors
+    /// If it cannot be written, or is one more than there should be.
+    pub fn add(&mut self, pixels: &[[u8; 3]]) -> io::Result<()> {
+        let Changes { area, pixels } = self.screen.show(pixels);
+        if self.next > 0 {
+            // In this order every step lies within the picture, as the encoder checks.
+            self.writer.reset_frame_position()?;
+            self.writer.set_frame_dimension(area.width_px as u32, area.height_px as u32)?;
+            self.writer.set_frame_position(area.x as u32, area.y as u32)?;
+            self.writer.set_blend_op(BlendOp::Over)?;
+        }
+        if self.next + 1 == self.timing.frame_count {
+            self.writer.set_frame_delay(self.timing.last_cs, 100)?;
+        }
+        let rgba = |pixel: Option<[u8; 3]>| pixel.map_or([0; 4], |[r, g, b]| [r, g, b, 255]);
+        let samples: Vec<[u8; 4]> = pixels.into_iter().map(rgba).collect();
+        self.writer.write_image_data(samples.as_flattened())?;
+        self.next += 1;
+        Ok(())
+    }
+
+    /// Ends the animation.
+    ///
+    /// # Errors
+    /// If it cannot be written, or frames are missing.
+    pub fn finish(self) -> io::Result<()> {
+        Ok(self.writer.finish()?)
+    }
+}
+
+/// Writes an animated GIF: as near to the frames as 255 colours a frame come.
+pub struct GifEncoder<W: Write> {
+    encoder: gif::Encoder<W>,
+    screen: Screen,
+    timing: Timing,
+    next: u32,
+}
+
+impl<W: Write> GifEncoder<W> {
+    /// Begins an animation of frames of `size_px`, width and height, at most 65,535.
+    ///
+    /// # Errors
+    /// If `out` cannot be written, or a side is too long.
+    pub fn new(out: W, size_px: (u32, u32), timing: Timing, metadata: &Metadata) -> io::Result<Self> {
+        let side = |px| u16::try_from(px).map_err(|_| io::Error::other("a GIF has at most 65,535 px along a side"));
+        let mut encoder = gif::Encoder::new(out, side(size_px.0)?, side(size_px.1)?, &[]).map_err(gif_failure)?;
+        if timing.plays != 1 {
+            // The file counts repetitions.
+            let repeat = timing.plays.checked_sub(1).map_or(Repeat::Infinite, Repeat::Finite);
+            encoder.set_repeat(repeat).map_err(gif_failure)?;
+        }
+        for (keyword, text) in metadata {
+            let comment = format!("{keyword}={text}");
+            let blocks: Vec<&[u8]> = comment.as_bytes().chunks(GIF_BLOCK_BYTES).collect();
+            encoder.write_raw_extension(gif::AnyExtension(GIF_COMMENT), &blocks).map_err(gif_failure)?;
+        }
+        Ok(Self { encoder, screen: Screen::new(size_px.0), timing, next: 0 })
+    }
+
+    /// Adds the next frame, row by row from the top.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn add(&mut self, pixels: &[[u8; 3]]) -> io::Result<()> {
+        let Changes { area, pixels } = self.screen.show(pixels);
+        let changed: Vec<[u8; 3]> = pixels.iter().flatten().copied().collect();
+        let palette = match changed.len() {
+            0 => Vec::new(),
+            count => {
+                let changed = Photo { width_px: count as u32, height_px: 1, pixels: changed };
+                palette_of(&changed, COLOR_COUNT_MAX - 1).map_err(io::Error::other)?
+            }
+        };
+        let transparent = palette.len() as u8;
+        let mut indices = HashMap::new();
+        let mut index_of = |color: [u8; 3]| -> u8 {
+            // The palette is in rising order.
+            *indices
+                .entry(color)
+                .or_insert_with(|| palette.binary_search(&nearest(color, &palette)).unwrap_or_default() as u8)
+        };
+        let frame = Frame {
+            delay: self.timing.delay_cs(self.next),
+            dispose: DisposalMethod::Keep,
+            transparent: Some(transparent),
+            left: area.x as u16,
+            top: area.y as u16,
+            width: area.width_px as u16,
+            height: area.height_px as u16,
+            buffer: pixels.into_iter().map(|pixel| pixel.map_or(transparent, &mut index_of)).collect(),
+            palette: Some(palette.iter().chain([&[0; 3]]).flatten().copied().collect()),
+            ..Frame::default()
+        };
+        self.encoder.write_frame(&frame).map_err(gif_failure)?;
+        self.next += 1;
+        Ok(())
+    }
+
+    /// Ends the animation.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(self) -> io::Result<()> {
+        self.encoder.into_inner().map_err(io::Error::other)?.flush()
+    }
+}
+
+/// The failure of the file, where it is one: a full disk has words of its own.
+fn gif_failure(error: gif::EncodingError) -> io::Error {
+    match error {
+        gif::EncodingError::Io(error) => error,
+        other => io::Error::other(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn timing(frame_count: u32, frames_per_s: u16) -> Timing {
+        Timing { frame_count, frames_per_s, last_cs: 150, plays: 0 }
+    }
+
+    #[test]
+    fn delays_of_a_gif_add_up_to_the_true_time() {
+        for frames_per_s in [1, 7, 20, 24, 30, 50] {
+            let frames = timing(u32::from(frames_per_s) + 1, frames_per_s);
+            let delays: Vec<u16> = (0..frames.frame_count).map(|index| frames.delay_cs(index)).collect();
+            assert_eq!(delays.last(), Some(&150));
+            assert_eq!(delays.iter().sum::<u16>(), 250, "{frames_per_s}: {delays:?}");
+            assert!(delays[..delays.len() - 1].iter().all(|delay| delay.abs_diff(100 / frames_per_s) <= 1));
+        }
+    }
+
+    #[test]
+    fn only_the_box_around_what_changed_is_kept() {
+        let mut screen = Screen::new(4);
+        let mut pixels = vec![[1; 3]; 12];
+        let all = screen.show(&pixels);
+        assert_eq!(all.area, Area { x: 0, y: 0, width_px: 4, height_px: 3 });
+        assert!(all.pixels.iter().all(Option::is_some));
+        pixels[5] = [2; 3];
+        pixels[10] = [3; 3];
+        let some = screen.show(&pixels);
+        assert_eq!(some.area, Area { x: 1, y: 1, width_px: 2, height_px: 2 });
+        assert_eq!(some.pixels, [Some([2; 3]), None, None, Some([3; 3])]);
+        let none = screen.show(&pixels);
+        assert_eq!(none.area, Area { x: 0, y: 0, width_px: 1, height_px: 1 });
+        assert_eq!(none.pixels, [None]);
+    }
+
+    #[test]
+    fn frames_that_are_missing_or_too_many_are_errors() {
+        let mut out = Vec::new();
+        let mut encoder = ApngEncoder::new(&mut out, (1, 1), timing(2, 20), &Vec::new()).expect("it begins");
+        encoder.add(&[[1; 3]]).expect("the first frame");
+        encoder.add(&[[1; 3]]).expect("the second frame");
+        assert!(encoder.add(&[[1; 3]]).is_err());
+        let mut out = Vec::new();
+        let mut encoder = ApngEncoder::new(&mut out, (1, 1), timing(2, 20), &Vec::new()).expect("it begins");
+        encoder.add(&[[1; 3]]).expect("the first frame");
+        assert!(encoder.finish().is_err());
+    }
+}

@@ -1,0 +1,89 @@
+//! The masks of one evolution: what its flies may wear.
+
+use std::num::NonZeroU8;
+
+use super::shader::Shader;
+use super::template::{Source, Template};
+use crate::error::{Error, Result};
+use crate::model::mask::{COVERAGE_THRESHOLD, Texel};
+use crate::model::{Blend, Mask, MaskSet};
+
+/// A template in a shader.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outfit {
+    /// What is drawn.
+    pub template: Template,
+    /// How.
+    pub shader: Shader,
+}
+
+/// A set of masks, and which of its layers each outfit became.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wardrobe {
+    /// The masks, with the full square as layer 0, worn or not.
+    pub masks: MaskSet,
+    /// Per outfit, in the order asked for, its layer: the `mask` of flies that wear it. Outfits with the same texels share
+    /// a layer, and those that are the full square have layer 0.
+    pub layers: Vec<u16>,
+}
+
+impl Wardrobe {
+    /// The masks of `outfits`.
+    ///
+    /// With [`Blend::Translucent`], `opacity` scales every coverage `c` to `(c * opacity + 127) / 255`; with
+    /// [`Blend::Opaque`] it means nothing.
+    ///
+    /// # Errors
+    /// [`Error::Input`] naming the file, or [`Error::Usage`] for a built-in template, if an outfit would cover nothing;
+    /// [`Error::Usage`] if there are more masks than a set can hold.
+    pub fn new(outfits: &[Outfit], blend: Blend, opacity: NonZeroU8) -> Result<Self> {
+        let mut others: Vec<Mask> = Vec::new();
+        let mut layers = Vec::with_capacity(outfits.len());
+        let square = Mask::square();
+        for outfit in outfits {
+            let mask = match blend {
+                Blend::Opaque => outfit.shader.mask(&outfit.template),
+                Blend::Translucent => thinned(&outfit.shader.mask(&outfit.template), opacity),
+            };
+            if !covers_anything(&mask, blend) {
+                return Err(covers_nothing(outfit));
+            }
+            let layer = if mask == square {
+                0
+            } else if let Some(known) = others.iter().position(|other| *other == mask) {
+                known + 1
+            } else {
+                others.push(mask);
+                others.len()
+            };
+            layers.push(layer as u16);
+        }
+        Ok(Self { masks: MaskSet::with_layers(others)?.with_blend(blend), layers })
+    }
+}
+
+fn thinned(mask: &Mask, opacity: NonZeroU8) -> Mask {
+    let scaled = |coverage: u8| ((u32::from(coverage) * u32::from(opacity.get()) + 127) / 255) as u8;
+    let texels = mask.texels().iter().map(|texel| Texel { coverage: scaled(texel.coverage), ..*texel }).collect();
+    Mask::new(texels).expect("as many texels as before")
+}
+
+fn covers_anything(mask: &Mask, blend: Blend) -> bool {
+    let least = match blend {
+        Blend::Opaque => COVERAGE_THRESHOLD,
+        Blend::Translucent => 1,
+    };
+    mask.texels().iter().any(|texel| texel.coverage >= least)
+}
+
+fn covers_nothing(outfit: &Outfit) -> Error {
+    let reason = format!(
+        "under the shader `{}` its tiles would cover nothing; draw it more opaque, or take another shader or a higher \
+         opacity",
+        outfit.shader
+    );
+    match outfit.template.source() {
+        Source::File(path) => Error::input(path, reason),
+        Source::BuiltIn(shape) => Error::Usage(format!("the mask `{shape}`: {reason}")),
+    }
+}

@@ -1,0 +1,102 @@
+//! Masks, shaders, blending, few colours and palettes on the command line.
+
+use std::collections::BTreeSet;
+
+use crate::workshop::Workshop;
+
+/// Evolves with `flags` on the CPU and on software Vulkan; returns the pixels, which must be the same in all files.
+fn evolve_on_both(workshop: &Workshop, flags: &str) -> image::RgbImage {
+    workshop.evolve(&format!("{flags} -o cpu.png --force --save-target target.png"));
+    workshop.evolve(&format!("{flags} -o gpu.png --force --device name:llvmpipe --batch-births 1"));
+    assert_eq!(workshop.read("cpu.png"), workshop.read("gpu.png"), "{flags}");
+    workshop.pixels("cpu.png")
+}
+
+#[test]
+fn every_mask_and_every_shader_gives_the_same_bytes_on_the_cpu_and_on_vulkan() {
+    let workshop = Workshop::new();
+    let masks = ["square", "border", "lines", "flower", "disc", "triangle", "hexagon", "brush", "flower,disc"];
+    let shaders = ["flat", "template", "outline", "emboss", "soft", "hollow", "negative", "fade", "wash"];
+    let mut seen = BTreeSet::new();
+    for (mask, shader) in masks.iter().zip(shaders) {
+        for blend in ["", "--blend translucent", "--opacity 0.5"] {
+            let pixels = evolve_on_both(&workshop, &format!("--mask {mask} --shader {shader} {blend}"));
+            seen.insert(pixels.into_raw());
+        }
+    }
+    // Flat squares are opaque everywhere, so that blending them changes nothing.
+    assert_eq!(seen.len(), masks.len() * 3 - 1);
+}
+
+#[test]
+fn the_reported_sae_is_that_of_the_picture_whatever_the_tiles() {
+    let workshop = Workshop::new();
+    for flags in [
+        "--mask brush --blend translucent",
+        "--mask flower --colors 7",
+        "--mask disc --shader soft --opacity 0.4",
+        "--mask square --restarts 1 --restart-mask border,lines",
+    ] {
+        let row = workshop.evolve_to_row(&format!("{flags} -o x.png --save-target t.png --force"));
+        let (made, wanted) = (workshop.pixels("x.png"), workshop.pixels("t.png"));
+        let sae: u64 = made.iter().zip(wanted.iter()).map(|(&a, &b)| u64::from(a.abs_diff(b))).sum();
+        assert_eq!(row["sae"], sae, "{flags}");
+    }
+}
+
+#[test]
+fn masks_of_the_users_own_are_worn() {
+    let workshop = Workshop::new();
+    let svg = r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 10 10"><path d="M0 10L5 0L10 10z"/></svg>"#;
+    workshop.write("tent.svg", svg.as_bytes());
+    image::GrayImage::from_fn(30, 30, |i, _| image::Luma([if i < 15 { 255 } else { 0 }]))
+        .save(workshop.path("half.png"))
+        .expect("the picture is written");
+    let tent = evolve_on_both(&workshop, "--mask tent.svg");
+    let half = evolve_on_both(&workshop, "--mask half.png");
+    let plain = evolve_on_both(&workshop, "");
+    assert!(tent != half && half != plain && tent != plain);
+}
+
+#[test]
+fn few_colours_are_those_of_the_target_and_a_palette_holds_the_tiles_too() {
+    let workshop = Workshop::new();
+    workshop.evolve("--colors 6 -o few.png --save-target target.png");
+    let colors = |name: &str| workshop.pixels(name).pixels().map(|pixel| pixel.0).collect::<BTreeSet<_>>();
+    assert!((2..=6).contains(&colors("target.png").len()), "{:?}", colors("target.png"));
+    assert!(colors("few.png").len() > 6, "the tiles' colours evolve freely");
+
+    workshop.write("three.hex", b"ff0000\n00ff00\n#000000\n");
+    let palette = BTreeSet::from([[255, 0, 0], [0, 255, 0], [0, 0, 0]]);
+    workshop.evolve("--palette three.hex -o held.png --save-target target.png --force");
+    assert!(colors("target.png").is_subset(&palette) && colors("held.png").is_subset(&palette));
+}
+
+#[test]
+fn looks_that_make_no_sense_are_refused_in_one_sentence() {
+    let workshop = Workshop::new();
+    workshop.write("empty.hex", b"\n; nothing\n");
+    workshop.write("words.hex", b"ff0000\nred\n");
+    workshop.write("broken.svg", b"<svg");
+    image::GrayImage::new(8, 8).save(workshop.path("black.png")).expect("the picture is written");
+    for (flags, told) in [
+        ("--mask star", "there is no such mask"),
+        ("--mask broken.svg", "broken.svg"),
+        ("--mask black.png", "black.png"),
+        ("--shader glossy", "glossy"),
+        ("--opacity 0", "--opacity 0"),
+        ("--opacity nan", "--opacity"),
+        ("--opacity 0.5 --blend opaque", "--blend"),
+        ("--restart-mask disc", "--restarts"),
+        ("--colors 0", "1 to 256"),
+        ("--colors 6 --palette empty.hex", "cannot be used with"),
+        ("--palette empty.hex", "empty palette"),
+        ("--palette words.hex", "line 2"),
+        ("--palette missing.gpl", "no such file"),
+    ] {
+        let ran = workshop.run(&format!("evolve photo.png -o x.png {flags}"));
+        assert_eq!(ran.code, Some(2), "{flags}: {}", ran.stderr);
+        assert!(ran.stderr.contains(told) && ran.stderr.lines().count() == 1, "{flags}: {}", ran.stderr);
+        assert!(!workshop.files().contains("x.png"), "{flags}");
+    }
+}
