@@ -70,6 +70,10 @@ pub(super) enum Command {
     /// Thousands of coloured tiles are bred, one death and one birth at a time, until together they look like the
     /// picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Draw a population again, at any size, or write it in another format
+    ///
+    /// At the size at which it evolved the picture is the one that `evolve` wrote.
+    Render(Box<RenderArgs>),
     /// Make the figures and tables of the paper from your own pictures
     ///
     /// Each is a page with its pictures, plots and tables, to be opened from disk.
@@ -77,11 +81,9 @@ pub(super) enum Command {
     /// Show every mask and every shader on the same pictures
     Gallery(GalleryArgs),
     /// Turn the snapshots of an evolution into an animation
+    ///
     /// Draws what `smalti evolve --save-run DIR` kept, in order and at any size.
     Timelapse(Box<TimelapseArgs>),
-    /// Draw a population again, at any size, or write it in another format
-    /// At the size at which it evolved the picture is the one that `evolve` wrote.
-    Render(Box<RenderArgs>),
     /// List the Vulkan devices of this machine, and which one would be taken
     Devices(DevicesArgs),
     /// Measure how much pictures are like a reference
@@ -125,7 +127,6 @@ pub(super) struct EvolveArgs {
     /// Births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 100th of all]
     #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
     pub save_every: Option<u64>,
-    /// Replace outputs that are not smalti's or were made with other options
     /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
     #[arg(long, help_heading = "Output")]
     pub force: bool,

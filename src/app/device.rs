@@ -84,14 +84,6 @@ impl Selected {
         }
     }
 
-    /// What somebody should know who left the choice to the program.
-    pub(super) fn note(&self) -> Option<String> {
-        match self {
-            Self::Cpu { reason: Some(reason) } => Some(format!("computing on the CPU, since {reason}")),
-            _ => None,
-        }
-    }
-
     /// An evaluator with one lane per scene on this device.
     ///
     /// # Errors

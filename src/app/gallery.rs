@@ -82,13 +82,13 @@ pub(super) fn make(args: &GalleryArgs) -> ExitCode {
 
 fn try_make(args: &GalleryArgs) -> Result<()> {
     let interrupt = Interrupt::listen()?;
-    run::start_threads(options::threads(args.threads)?)?;
+    run::start_threads(options::thread_count(args.threads)?)?;
     let page = args.output.join("README.md");
     check_page(&page, args.force)?;
     let targets = args.inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
-    let device = device::select(&options::device(&args.device, Validation::Off)?, Validation::Off)?;
+    let device = device::select(&options::device(&args.device)?, Validation::Off)?;
     report::say_device(&device);
     let began = Instant::now();
     let study = Study::new(&device, &interrupt, Progress::new(args.progress));

@@ -43,8 +43,8 @@ pub use cli::Cli;
 pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
-        cli::Command::Timelapse(args) => timelapse::make(args),
         cli::Command::Render(args) => render::render(args),
+        cli::Command::Timelapse(args) => timelapse::make(args),
         cli::Command::Devices(args) => devices::list(args),
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),

@@ -99,9 +99,9 @@ impl EvolveOptions {
     /// [`Error::Usage`] that names the flag and what it may be.
     pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
-        let threads = threads(args.threads)?;
+        let threads = thread_count(args.threads)?;
         let validation = if args.validate { Validation::On } else { Validation::Off };
-        let device = device(&args.device, validation)?;
+        let device = watched_device(&args.device, validation)?;
         let preset_side = args.preset.map(|preset| u64::from(preset.side_px));
         let options = Self {
             input: args.input.clone(),
@@ -147,11 +147,6 @@ pub(super) fn side_px(flag: &str, px: u64) -> Result<u32> {
     in_range(flag, px, (1, u64::from(TARGET_SIDE_MAX_PX))).map(|px| px as u32)
 }
 
-/// The value of `--threads`.
-pub(super) fn threads(count: Option<u64>) -> Result<Option<usize>> {
-    count.map(|count| in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize)).transpose()
-}
-
 /// Refuses a picture on the stdout that the row of `--json` goes to.
 pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
     if outputs.iter().any(Destination::is_stdout) {
@@ -161,16 +156,21 @@ pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
 }
 
 /// The device that was asked for; it must be one that can be watched, if it is to be.
-pub(super) fn device(text: &str, validation: Validation) -> Result<DeviceRequest> {
-    let device = device_request(text)?;
+pub(super) fn watched_device(text: &str, validation: Validation) -> Result<DeviceRequest> {
+    let device = device(text)?;
     if validation == Validation::On && device == DeviceRequest::Cpu {
         return Err(Error::Usage("--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned()));
     }
     Ok(device)
 }
 
-/// What the word asks for; none at all, as in an empty SMALTI_DEVICE, asks for nothing.
-fn device_request(text: &str) -> Result<DeviceRequest> {
+/// The number of CPU threads that was asked for, if any.
+pub(super) fn thread_count(asked: Option<u64>) -> Result<Option<usize>> {
+    asked.map(|count| in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize)).transpose()
+}
+
+/// The device that was asked for; no word at all, as in an empty SMALTI_DEVICE, asks for none.
+pub(super) fn device(text: &str) -> Result<DeviceRequest> {
     let text = text.trim();
     if text.is_empty() {
         return Ok(DeviceRequest::Auto);

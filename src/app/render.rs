@@ -115,9 +115,9 @@ impl RenderOptions {
             background: args.background,
             look: look(&args.look)?,
             supersampling: supersampling.transpose()?.map(|count| count as u32),
-            device: options::device(&args.device, validation)?,
+            device: options::watched_device(&args.device, validation)?,
             validation,
-            threads: options::threads(args.threads)?,
+            threads: options::thread_count(args.threads)?,
             verbosity: match (args.quiet, args.verbose) {
                 (true, _) => Verbosity::Quiet,
                 (false, true) => Verbosity::Verbose,
@@ -231,8 +231,8 @@ fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
     }
     row.load_ms = report::milliseconds(began.elapsed());
     row.tiles = Some(population.flies.len());
-    if let Some(note) = selected.note().filter(|_| options.verbosity > Verbosity::Quiet) {
-        report::say(&format!("smalti: {note}"));
+    if options.verbosity > Verbosity::Quiet {
+        report::say_device(&selected);
     }
     let view = options.view(population.width_px, population.height_px)?;
     check_size(options, &population, &view)?;
@@ -244,7 +244,7 @@ fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
 
     let began = Instant::now();
     let mut drawn = Drawn { population, marginal: fitness, view, picture: None, layers: None };
-    draw(&mut drawn, options, selected)?;
+    draw(&mut drawn, options, &selected)?;
     row.draw_ms = report::milliseconds(began.elapsed());
     let began = Instant::now();
     let files = outputs::encode(&options.outputs.iter().collect::<Vec<_>>(), drawn, &provenances.told(&meta))?;
@@ -287,7 +287,7 @@ fn check_size(options: &RenderOptions, population: &Population, view: &View) -> 
 }
 
 /// Draws what the outputs need; the device is closed before it returns.
-fn draw(drawn: &mut Drawn, options: &RenderOptions, selected: Selected) -> Result<()> {
+fn draw(drawn: &mut Drawn, options: &RenderOptions, selected: &Selected) -> Result<()> {
     if !options.outputs.iter().any(Destination::is_raster) {
         return Ok(());
     }

@@ -245,8 +245,8 @@ pub(super) fn say(line: &str) {
 
 /// Says that the CPU computes, to those who did not ask for it.
 pub(super) fn say_device(selected: &Selected) {
-    if let Some(note) = selected.note() {
-        say(&format!("smalti: {note}"));
+    if let Selected::Cpu { reason: Some(reason) } = selected {
+        say(&format!("smalti: computing on the CPU, since {reason}"));
     }
 }
 

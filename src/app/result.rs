@@ -33,8 +33,7 @@ pub(super) fn draw(
     let (scored, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
     let (width_px, height_px) = (population.width_px, population.height_px);
     let mosaic = evaluator.draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
-    let target = &evaluator.scene(0).target;
-    let difference = Difference::between(&mosaic.pixels, target.pixels());
+    let difference = Difference::between(&mosaic.pixels, evaluator.scene(0).target.pixels());
     let drawn = difference.sae();
     if scored != ending.sae || drawn != ending.sae {
         return Err(Error::Internal(format!(

@@ -75,7 +75,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let mut curve = (!options.curves.is_empty()).then(|| Curve::new(0));
     let recorder = begin_record(options, &job, &provenances)?;
     let mut watchers = Watchers { interrupt: &interrupt, recorder };
-    let evolved = evolve_job(options, &job, selected, (&mut watchers, &mut curve), row)?;
+    let evolved = evolve_job(options, &job, &selected, (&mut watchers, &mut curve), row)?;
     let recorder = watchers.recorder;
     let began = Instant::now();
     let status = evolved.ending.status;
@@ -179,7 +179,7 @@ fn say_notes(job: &Job, options: &EvolveOptions, selected: &Selected) {
 fn evolve_job(
     options: &EvolveOptions,
     job: &Job,
-    selected: Selected,
+    selected: &Selected,
     (watchers, curve): (&mut Watchers<'_>, &mut Option<Curve>),
     row: &mut Row,
 ) -> Result<Evolved> {

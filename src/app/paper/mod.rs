@@ -137,7 +137,7 @@ pub(super) fn make(args: &PaperArgs) -> ExitCode {
 
 fn try_make(args: &PaperArgs) -> Result<()> {
     let interrupt = Interrupt::listen()?;
-    run::start_threads(options::threads(args.threads)?)?;
+    run::start_threads(options::thread_count(args.threads)?)?;
     let images = match &args.images {
         None if args.name.needs_pictures() => {
             return Err(Error::Usage("this figure needs pictures; name their folder with --images".to_owned()));
@@ -147,7 +147,7 @@ fn try_make(args: &PaperArgs) -> Result<()> {
     };
     let overwrite = if args.force { Overwrite::Force } else { Overwrite::Refuse };
     let folder = Folder::open(&args.output, overwrite)?;
-    let device = device::select(&options::device(&args.device, Validation::Off)?, Validation::Off)?;
+    let device = device::select(&options::device(&args.device)?, Validation::Off)?;
     if !args.quiet {
         report::say_device(&device);
     }

@@ -14,7 +14,7 @@ use crate::model::Rgb;
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::output;
 use crate::photo::{GIF_FRAMES_PER_S_MAX, Timing};
-use crate::vk::{DeviceRequest, Validation};
+use crate::vk::DeviceRequest;
 
 /// Most frames a second.
 const FRAMES_PER_S_MAX: u64 = 120;
@@ -150,7 +150,7 @@ impl TimelapseOptions {
             spacing: args.spacing,
             hold_cs: ((args.hold * 100.0).round() as u16).max(shortest_cs),
             plays: in_range("--loop", args.plays, (0, u64::from(u16::MAX)))? as u16,
-            device: device(&args.device, Validation::Off)?,
+            device: device(&args.device)?,
             threads: threads.map(|count| count as usize),
             progress: if args.quiet && args.progress == ProgressKind::Auto {
                 ProgressKind::None
