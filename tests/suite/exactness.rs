@@ -13,7 +13,7 @@ use smalti::vk::{DeviceOptions, Staging};
 use crate::canary;
 use crate::reference::Reference;
 use crate::scenarios::{
-    Scenario, any_fly, deep_stacks, holed_masks, random_scene, scenarios, stream, translucent_masks,
+    Scenario, any_fly, deep_stacks, dressed_scenarios, holed_masks, random_scene, scenarios, stream, translucent_masks,
     translucent_scenarios,
 };
 
@@ -81,6 +81,17 @@ fn on_vulkan_fitness_layers_and_mosaic_equal_brute_force() {
 #[test]
 fn on_vulkan_translucent_fitness_layers_and_mosaic_equal_brute_force() {
     for scenario in translucent_scenarios().into_iter().chain(deep_stacks()) {
+        canary::with_device(&DeviceOptions::default(), |device| {
+            let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
+            check_scenario(&mut evaluator, &scenario);
+        });
+    }
+}
+
+#[test]
+fn every_mask_under_every_shader_equals_brute_force_on_the_cpu_and_on_vulkan() {
+    for scenario in dressed_scenarios() {
+        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &scenario);
         canary::with_device(&DeviceOptions::default(), |device| {
             let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
             check_scenario(&mut evaluator, &scenario);

@@ -1,5 +1,6 @@
 //! Scenes and populations that stress exactness: ties, borders, giants, hidden tiles, holes, odd sizes.
 
+use std::num::NonZeroU8;
 use std::sync::Arc;
 
 use rand::RngExt;
@@ -7,6 +8,7 @@ use smalti::model::fly::{SIDE_MAX, SIDE_MIN, Z_MAX, position_max};
 use smalti::model::mask::{MASK_SIDE, Mask, MaskSet, Texel};
 use smalti::model::rng::{Purpose, Stream};
 use smalti::model::{Blend, Fly, Scene, Target};
+use smalti::shapes::{BuiltIn, Outfit, Shader, Wardrobe};
 
 /// A scene with a population, and a name for messages.
 pub struct Scenario {
@@ -93,6 +95,24 @@ pub fn translucent_scenarios() -> Vec<Scenario> {
         }
     }
     all
+}
+
+/// Tiles in every built-in mask under every shader, opaque and translucent.
+pub fn dressed_scenarios() -> [Scenario; 2] {
+    let shapes = || BuiltIn::ALL.into_iter().map(BuiltIn::template);
+    let outfits: Vec<Outfit> =
+        shapes().flat_map(|template| Shader::ALL.map(|shader| Outfit { template: template.clone(), shader })).collect();
+    [("every mask and shader, opaque", Blend::Opaque), ("every mask and shader, translucent", Blend::Translucent)].map(
+        |(name, blend)| {
+            let Wardrobe { masks, layers } = Wardrobe::new(&outfits, blend, NonZeroU8::MAX).expect("all are seen");
+            let mut random = stream(72);
+            let plain = random_scene(80, 60, 4 * layers.len(), &mut random);
+            let scene = Scene { masks: Arc::new(masks), ..plain };
+            let mut flies = flies(&scene, 2.0..24.0, &mut random);
+            flies.iter_mut().zip(layers.iter().cycle()).for_each(|(fly, &layer)| fly.mask = layer);
+            Scenario { name, scene, flies }
+        },
+    )
 }
 
 /// 20,000 tiles that all cover the whole of a small picture, with `masks`: no pixel may lose a layer.
