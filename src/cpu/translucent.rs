@@ -4,6 +4,8 @@
 //! Exact: leaving out layer k starts from the state before k and composites the layers behind it again, as each layer
 //! rounds. [`CHUNK`] layers are left out side by side, so that a layer is read once for all of them.
 
+#![allow(clippy::needless_range_loop, reason = "one index for several arrays of one length makes them vectors")]
+
 use multiversion::multiversion;
 
 use super::lane_evaluation::{Block, BlockView, PIXELS, SIDE, error, inside};

@@ -15,8 +15,8 @@ use crate::model::tally::{BlockParts, Tally};
 use crate::model::translucency::LAYERS_MAX;
 use crate::model::{Evaluation, Lane};
 use crate::vk::{
-    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePipeline, ComputeShader, Device, DeviceKind,
-    ReadTicket, Recorder, Residence,
+    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePipeline, ComputeShader, Device, ReadTicket,
+    Recorder, Residence,
 };
 
 /// Layers that the kernel leaves out side by side.
@@ -76,8 +76,9 @@ pub(super) struct TranslucentPass {
 impl TranslucentPass {
     /// Creates the pass for lanes whose shared data are in `shared`.
     pub fn create(device: &Arc<Device>, shared: &EvaluatePass, lanes: &[Lane]) -> Result<Self> {
-        let pixels_per_thread = pixels_per_thread(device.info().kind);
-        let shape = KernelShape { pixels_per_thread: pixels_per_thread as u32, ..shared.variant.shape };
+        let shape = shared.variant.shape;
+        // With more, the deepest stacks would need more turns of a loop than there may be.
+        let shape = KernelShape { pixels_per_thread: shape.pixels_per_thread.min(8), ..shape };
         let block_pixels = shared.variant.shape.block_pixels();
         let block_count: usize = lanes.iter().map(|lane| lane.lists().block_count()).sum();
         let fly_count = lanes.iter().map(|lane| lane.tiles().len()).max().unwrap_or(0);
@@ -104,7 +105,7 @@ impl TranslucentPass {
             blocks: vec![BlockParts::default(); lane.lists().block_count()],
         };
         Ok(Self {
-            pixels_per_thread,
+            pixels_per_thread: shape.pixels_per_thread as usize,
             block_pixels,
             ledgers: lanes.iter().map(ledger).collect(),
             batch: Batch::default(),
@@ -294,14 +295,6 @@ fn plan(length: usize, pixels_per_thread: usize) -> Vec<Step> {
 /// Words of scratch for a block with a list of `length`.
 fn scratch_words(length: usize, block_pixels: usize) -> usize {
     (STATE_WORDS + LAYER_WORDS * length.min(LAYERS_MAX)) * block_pixels
-}
-
-/// Pixels of one column that an invocation works on.
-fn pixels_per_thread(kind: DeviceKind) -> usize {
-    match kind {
-        DeviceKind::Cpu => 8,
-        _ => 1,
-    }
 }
 
 fn create_pipeline(device: &Arc<Device>, shape: KernelShape) -> Result<Arc<ComputePipeline>> {

@@ -122,6 +122,6 @@ impl MaskSet {
 #[inline(always)]
 #[must_use]
 pub fn shaded(color: u32, shade: u32) -> u32 {
-    let channel = |shift: u32| ((color >> shift & 255) * shade + 127) / 255 << shift;
+    let channel = |shift: u32| (((color >> shift & 255) * shade + 127) / 255) << shift;
     channel(0) | channel(8) | channel(16)
 }

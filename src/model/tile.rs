@@ -207,12 +207,12 @@ impl Tile {
     }
 }
 
-/// What [`quotient`] multiplies by instead of dividing by `divisor`, 1 to 2^18: `2^(23 + shift) / divisor` in 24 bits,
+/// What `quotient` multiplies by instead of dividing by `divisor`, 1 to 2^18: `2^(23 + shift) / divisor` in 24 bits,
 /// above it the shift that leaves 16 bits of any `value < divisor << 8`.
 #[must_use]
 pub fn inverse(divisor: u32) -> u32 {
-    let shift = (24 - divisor.leading_zeros().min(24)) as u64;
-    (shift << 24 | ((1 << (23 + shift)) - 1) / u64::from(divisor)) as u32
+    let shift = 24 - divisor.leading_zeros().min(24);
+    (shift << 24) | (((1_u64 << (23 + shift)) - 1) / u64::from(divisor)) as u32
 }
 
 /// `value / divisor` for `value < divisor << 8`, given the divisor's [`inverse`]; any number for other values.
