@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
 use super::look::LookArgs;
 use super::paper::PaperArgs;
@@ -198,12 +199,8 @@ pub(super) struct EvolveArgs {
     #[command(flatten)]
     pub variation: SchemeArgs,
 
-    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
-    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]
-    pub device: String,
-    /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", value_parser = values::count, help_heading = "Computing")]
-    pub threads: Option<u64>,
+    #[command(flatten)]
+    pub computing: ComputingArgs,
     /// Watch every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,

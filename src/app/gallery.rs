@@ -9,20 +9,20 @@ use std::time::Instant;
 use clap::Args;
 
 use super::cli::ProgressKind;
+use super::computing::ComputingArgs;
 use super::interrupt::Interrupt;
 use super::look::{Dress, Look, LookArgs};
-use super::options;
+use super::options::Verbosity;
 use super::progress::Progress;
 use super::sheet::sheet;
 use super::study::{Evolved, Recipe, Study};
-use super::{device, report, run, values};
+use super::{report, values};
 use crate::error::{Error, Result};
 use crate::evolve::{ColorMode, ColorRule, PaperScheme};
 use crate::model::{Canvas, Target};
 use crate::output;
 use crate::photo::{self, Format, Metadata, Photo, ReadOptions};
 use crate::shapes::{BuiltIn, Shader};
-use crate::vk::Validation;
 
 /// Longer side in px that pictures are evolved at, and cells are shown at.
 const SIDE_PX: u32 = 256;
@@ -55,12 +55,8 @@ pub(super) struct GalleryArgs {
     /// Replace a README.md that is not a gallery
     #[arg(long)]
     pub force: bool,
-    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
-    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
-    pub device: String,
-    /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", value_parser = values::count)]
-    pub threads: Option<u64>,
+    #[command(flatten)]
+    pub computing: ComputingArgs,
     /// How to show progress on stderr
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
     pub progress: ProgressKind,
@@ -82,14 +78,12 @@ pub(super) fn make(args: &GalleryArgs) -> ExitCode {
 
 fn try_make(args: &GalleryArgs) -> Result<()> {
     let interrupt = Interrupt::listen()?;
-    run::start_threads(options::thread_count(args.threads)?)?;
     let page = args.output.join("README.md");
     check_page(&page, args.force)?;
     let targets = args.inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
-    let device = device::select(&options::device(&args.device)?, Validation::Off)?;
-    report::say_device(&device);
+    let device = args.computing.begin(Verbosity::Normal)?;
     let began = Instant::now();
     let study = Study::new(&device, &interrupt, Progress::new(args.progress));
     let made = Shader::ALL.into_iter().try_for_each(|shader| make_sheet(args, &study, &targets, shader));

@@ -4,6 +4,7 @@
 //! on stderr; stdout carries data only.
 
 mod cli;
+mod computing;
 mod curve;
 mod curve_file;
 mod destination;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
+use super::computing::Computing;
 use super::curve_file::CurveFile;
 use super::destination::{self, Destination};
 use super::look::Look;
@@ -16,14 +17,12 @@ use crate::evolve::{OnDry, PaperScheme};
 use crate::model::Rgb;
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::vk::{DeviceRequest, Validation};
+use crate::vk::Validation;
 
 /// Most restarts of one evolution.
 const RESTARTS_MAX: u64 = 1_000_000;
 /// Least factor of the mutation steps: it is kept in 65,536ths and must not become 0.
 const COOL_MIN: f64 = 0.00001;
-/// Most CPU threads.
-pub(super) const THREADS_MAX: u64 = 1_024;
 
 /// What to do about outputs that exist already and are not what the same command would write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,9 +84,7 @@ pub(super) struct EvolveOptions {
     pub init: Option<PathBuf>,
     pub scheme: PaperScheme,
     pub time_limit: Option<Duration>,
-    pub device: DeviceRequest,
-    pub validation: Validation,
-    pub threads: Option<usize>,
+    pub computing: Computing,
     pub progress: ProgressKind,
     pub verbosity: Verbosity,
 }
@@ -99,9 +96,7 @@ impl EvolveOptions {
     /// [`Error::Usage`] that names the flag and what it may be.
     pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
-        let threads = thread_count(args.threads)?;
         let validation = if args.validate { Validation::On } else { Validation::Off };
-        let device = watched_device(&args.device, validation)?;
         let preset_side = args.preset.map(|preset| u64::from(preset.side_px));
         let options = Self {
             input: args.input.clone(),
@@ -120,9 +115,7 @@ impl EvolveOptions {
             init: args.init.clone(),
             scheme: scheme(args)?,
             time_limit: args.time,
-            device,
-            validation,
-            threads,
+            computing: args.computing.check(validation)?,
             progress: progress(args),
             verbosity: verbosity(args),
         };
@@ -153,33 +146,6 @@ pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
         return Err(Error::Usage("-o - and --json both write to stdout; drop one of them".to_owned()));
     }
     Ok(())
-}
-
-/// The device that was asked for; it must be one that can be watched, if it is to be.
-pub(super) fn watched_device(text: &str, validation: Validation) -> Result<DeviceRequest> {
-    let device = device(text)?;
-    if validation == Validation::On && device == DeviceRequest::Cpu {
-        return Err(Error::Usage("--validate watches Vulkan, and --device cpu uses none; drop one of them".to_owned()));
-    }
-    Ok(device)
-}
-
-/// The number of CPU threads that was asked for, if any.
-pub(super) fn thread_count(asked: Option<u64>) -> Result<Option<usize>> {
-    asked.map(|count| in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize)).transpose()
-}
-
-/// The device that was asked for; no word at all, as in an empty SMALTI_DEVICE, asks for none.
-pub(super) fn device(text: &str) -> Result<DeviceRequest> {
-    let text = text.trim();
-    if text.is_empty() {
-        return Ok(DeviceRequest::Auto);
-    }
-    if text.bytes().all(|byte| byte.is_ascii_digit()) && text.parse::<usize>().is_err() {
-        let why = format!("--device {text}: no machine has as many; see smalti devices for the numbers, or use auto");
-        return Err(Error::NoSuitableDevice { why });
-    }
-    text.parse()
 }
 
 fn colors(args: &EvolveArgs) -> Colors {

@@ -10,8 +10,9 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
+use super::computing::{Computing, ComputingArgs};
 use super::destination::{self, Destination};
-use super::device::{self, Opened, Selected};
+use super::device::{Opened, Selected};
 use super::interrupt::Interrupt;
 use super::look::{Dress, Look, LookArgs};
 use super::options::{self, Overwrite, Verbosity};
@@ -24,7 +25,7 @@ use crate::error::{Error, Result};
 use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Population, Rgb, Scene, Target};
-use crate::vk::{DeviceRequest, Validation};
+use crate::vk::Validation;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -64,12 +65,8 @@ pub(super) struct RenderArgs {
     #[command(flatten)]
     pub look: LookArgs,
 
-    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
-    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]
-    pub device: String,
-    /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", value_parser = values::count, help_heading = "Computing")]
-    pub threads: Option<u64>,
+    #[command(flatten)]
+    pub computing: ComputingArgs,
     /// Watch every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
@@ -96,9 +93,7 @@ struct RenderOptions {
     look: Option<Look>,
     /// `None` means what the size asks for.
     supersampling: Option<u32>,
-    device: DeviceRequest,
-    validation: Validation,
-    threads: Option<usize>,
+    computing: Computing,
     verbosity: Verbosity,
 }
 
@@ -115,9 +110,7 @@ impl RenderOptions {
             background: args.background,
             look: look(&args.look)?,
             supersampling: supersampling.transpose()?.map(|count| count as u32),
-            device: options::watched_device(&args.device, validation)?,
-            validation,
-            threads: options::thread_count(args.threads)?,
+            computing: args.computing.check(validation)?,
             verbosity: match (args.quiet, args.verbose) {
                 (true, _) => Verbosity::Quiet,
                 (false, true) => Verbosity::Verbose,
@@ -214,9 +207,9 @@ pub(super) fn render(args: &RenderArgs) -> ExitCode {
 
 /// The work, in order: check, read, draw, encode and write.
 fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
-    run::start_threads(options.threads)?;
+    options.computing.start_threads()?;
     destination::check_writable(options.outputs.iter(), &options.input)?;
-    let selected = device::select(&options.device, options.validation)?;
+    let selected = options.computing.select()?;
     row.device = Some(selected.label().to_owned());
 
     let began = Instant::now();

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::cli::EvolveArgs;
 use super::curve::Curve;
 use super::destination::Destination;
-use super::device::{self, Opened, Selected};
+use super::device::{Opened, Selected};
 use super::interrupt::Interrupt;
 use super::job::Job;
 use super::options::{EvolveOptions, Mode, Verbosity};
@@ -44,10 +44,10 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
 /// The work, in order: check, read, evolve and draw, encode and write.
 fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let mut interrupt = Interrupt::listen()?;
-    start_threads(options.threads)?;
+    options.computing.start_threads()?;
     destination::check_writable(options.destinations(), &options.input)?;
     curve_file::check_writable(&options.curves, options.destinations(), &options.input)?;
-    let selected = device::select(&options.device, options.validation)?;
+    let selected = options.computing.select()?;
     row.device = Some(selected.label().to_owned());
 
     let began = Instant::now();
@@ -104,15 +104,6 @@ fn begin_record(options: &EvolveOptions, job: &Job, provenances: &Provenances) -
     let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
     let told = provenance::without_header(provenances.population.describe(None));
     Recorder::begin(save_run, births_planned, job.population(Vec::new()), told).map(Some)
-}
-
-/// Gives the CPU twin as many threads as were asked for.
-pub(super) fn start_threads(count: Option<usize>) -> Result<()> {
-    let Some(count) = count else { return Ok(()) };
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(count)
-        .build_global()
-        .map_err(|error| Error::Usage(format!("--threads {count}: the threads cannot be started ({error})")))
 }
 
 /// Checks what depends on the picture's size; returns about how many bytes the work needs.

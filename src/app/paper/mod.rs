@@ -21,13 +21,13 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 
 use super::cli::ProgressKind;
+use super::computing::ComputingArgs;
 use super::interrupt::Interrupt;
-use super::options::{self, Overwrite};
+use super::options::{Overwrite, Verbosity};
 use super::progress::Progress;
 use super::study::Study;
-use super::{device, report, run, values};
+use super::{report, values};
 use crate::error::{Error, Result};
-use crate::vk::Validation;
 use folder::Folder;
 use page::{Content, Page};
 use workbench::Workbench;
@@ -59,12 +59,8 @@ pub(super) struct PaperArgs {
     /// Write into a folder that holds other files, too
     #[arg(long)]
     pub force: bool,
-    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
-    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
-    pub device: String,
-    /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", value_parser = values::count)]
-    pub threads: Option<u64>,
+    #[command(flatten)]
+    pub computing: ComputingArgs,
     /// How to show progress on stderr
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
     pub progress: ProgressKind,
@@ -137,7 +133,6 @@ pub(super) fn make(args: &PaperArgs) -> ExitCode {
 
 fn try_make(args: &PaperArgs) -> Result<()> {
     let interrupt = Interrupt::listen()?;
-    run::start_threads(options::thread_count(args.threads)?)?;
     let images = match &args.images {
         None if args.name.needs_pictures() => {
             return Err(Error::Usage("this figure needs pictures; name their folder with --images".to_owned()));
@@ -147,10 +142,7 @@ fn try_make(args: &PaperArgs) -> Result<()> {
     };
     let overwrite = if args.force { Overwrite::Force } else { Overwrite::Refuse };
     let folder = Folder::open(&args.output, overwrite)?;
-    let device = device::select(&options::device(&args.device)?, Validation::Off)?;
-    if !args.quiet {
-        report::say_device(&device);
-    }
+    let device = args.computing.begin(if args.quiet { Verbosity::Quiet } else { Verbosity::Normal })?;
     let quiet = args.quiet && args.progress == ProgressKind::Auto;
     let progress = Progress::new(if quiet { ProgressKind::None } else { args.progress });
     let began = Instant::now();

@@ -18,15 +18,14 @@ use serde_json::json;
 
 use self::film::Film;
 use self::options::TimelapseOptions;
-use super::device::{self, Opened};
+use super::device::Opened;
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::progress::{Progress, Stage, short_time};
 use super::snapshots::{self, Snapshot};
-use super::{memory, outputs, report, run};
+use super::{memory, outputs, report};
 use crate::archive;
 use crate::error::{Error, Result};
 use crate::model::{Canvas, Evaluator, MaskSet, Mosaic, Population, Rgb, Scene, Target};
-use crate::vk::Validation;
 
 pub(super) use self::options::TimelapseArgs;
 
@@ -68,7 +67,7 @@ pub(super) fn make(args: &TimelapseArgs) -> ExitCode {
 /// The work, in order: check, open every output, draw and encode, give the files their names.
 fn animate(options: &TimelapseOptions) -> Result<End> {
     let mut interrupt = Interrupt::listen()?;
-    run::start_threads(options.threads)?;
+    options.computing.start_threads()?;
     let snapshots = snapshots::list(&options.folder)?;
     let chosen = frames::choose(&snapshots, options.spacing, options.frame_count);
     let snapshots: Vec<&Snapshot> = chosen.into_iter().map(|index| &snapshots[index]).collect();
@@ -185,7 +184,7 @@ impl Studio {
         // Each output holds the frame before, the changes to it, and what waits.
         let held = pixel_count.saturating_mul(1 + 2 * options.outputs.len() as u64);
         memory::check(memory::estimate_bytes(0, first.flies.len(), held))?;
-        let selected = device::select(&options.device, Validation::Off)?;
+        let selected = options.computing.select()?;
         // Nothing is evaluated, and an evaluator has at least one lane.
         let target = Arc::new(Target::new(1, 1, vec![[0; 3]])?);
         let scene = Scene { target, masks: Arc::new(MaskSet::default()), background: [0; 3], fly_count: 1 };

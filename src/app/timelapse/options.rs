@@ -7,14 +7,15 @@ use clap::Args;
 
 use super::frames::Spacing;
 use crate::app::cli::ProgressKind;
-use crate::app::options::{Overwrite, THREADS_MAX, device, in_range};
+use crate::app::computing::{Computing, ComputingArgs};
+use crate::app::options::{Overwrite, in_range};
 use crate::app::values;
 use crate::error::{Error, Result};
 use crate::model::Rgb;
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::output;
 use crate::photo::{GIF_FRAMES_PER_S_MAX, Timing};
-use crate::vk::DeviceRequest;
+use crate::vk::Validation;
 
 /// Most frames a second.
 const FRAMES_PER_S_MAX: u64 = 120;
@@ -64,12 +65,8 @@ pub(in crate::app) struct TimelapseArgs {
     #[arg(long = "loop", value_name = "N", value_parser = values::count, default_value = "0", help_heading = "Time")]
     pub plays: u64,
 
-    /// What draws: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
-    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto", help_heading = "Computing")]
-    pub device: String,
-    /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", value_parser = values::count, help_heading = "Computing")]
-    pub threads: Option<u64>,
+    #[command(flatten)]
+    pub computing: ComputingArgs,
 
     /// How to show progress on stderr; a bar needs a terminal, elsewhere it becomes plain lines
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto", help_heading = "Messages")]
@@ -114,8 +111,7 @@ pub(super) struct TimelapseOptions {
     pub spacing: Spacing,
     hold_cs: u16,
     plays: u16,
-    pub device: DeviceRequest,
-    pub threads: Option<usize>,
+    pub computing: Computing,
     pub progress: ProgressKind,
     pub is_quiet: bool,
 }
@@ -129,7 +125,6 @@ impl TimelapseOptions {
         let sides = (1, u64::from(TARGET_SIDE_MAX_PX));
         let long_side_px = args.output_size.map(|px| in_range("--output-size", px, sides)).transpose()?;
         let frame_count = args.frames.map(|count| in_range("--frames", count, (1, u64::from(u32::MAX)))).transpose()?;
-        let threads = args.threads.map(|count| in_range("--threads", count, (1, THREADS_MAX))).transpose()?;
         let frames_per_s = in_range("--fps", args.fps, (1, FRAMES_PER_S_MAX))? as u16;
         if !(0.0..=HOLD_S_MAX).contains(&args.hold) {
             return Err(Error::Usage(format!("--hold {}: must be 0 to {HOLD_S_MAX} seconds", args.hold)));
@@ -150,8 +145,7 @@ impl TimelapseOptions {
             spacing: args.spacing,
             hold_cs: ((args.hold * 100.0).round() as u16).max(shortest_cs),
             plays: in_range("--loop", args.plays, (0, u64::from(u16::MAX)))? as u16,
-            device: device(&args.device)?,
-            threads: threads.map(|count| count as usize),
+            computing: args.computing.check(Validation::Off)?,
             progress: if args.quiet && args.progress == ProgressKind::Auto {
                 ProgressKind::None
             } else {
