@@ -247,6 +247,13 @@ pub(super) enum ProgressKind {
     None,
 }
 
+impl ProgressKind {
+    /// The kind to show: none for those who want to hear nothing, unless they asked for one.
+    pub(super) fn unless(self, is_quiet: bool) -> Self {
+        if is_quiet && self == Self::Auto { Self::None } else { self }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;

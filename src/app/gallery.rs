@@ -52,7 +52,7 @@ pub(super) struct GalleryArgs {
     /// Number that decides every random choice
     #[arg(long, value_name = "S", default_value_t = 0)]
     pub seed: u64,
-    /// Replace a README.md that is not a gallery
+    /// Write into a folder that holds other files, too
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
@@ -60,6 +60,9 @@ pub(super) struct GalleryArgs {
     /// How to show progress on stderr
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
     pub progress: ProgressKind,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// First line of a gallery's page, which tells it from other files.
@@ -79,30 +82,35 @@ pub(super) fn make(args: &GalleryArgs) -> ExitCode {
 fn try_make(args: &GalleryArgs) -> Result<()> {
     let interrupt = Interrupt::listen()?;
     let page = args.output.join("README.md");
-    check_page(&page, args.force)?;
+    check_folder(&args.output, &page, args.force)?;
     let targets = args.inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
-    let device = args.computing.begin(Verbosity::Normal)?;
+    output::check_writable(&page)?;
+    let device = args.computing.begin(if args.quiet { Verbosity::Quiet } else { Verbosity::Normal })?;
     let began = Instant::now();
-    let study = Study::new(&device, &interrupt, Progress::new(args.progress));
+    let study = Study::new(&device, &interrupt, Progress::new(args.progress.unless(args.quiet)));
     let made = Shader::ALL.into_iter().try_for_each(|shader| make_sheet(args, &study, &targets, shader));
     study.finish();
     made?;
     output::write_atomically(&page, markdown(args).as_bytes())?;
-    report::say(&format!("wrote {} in {:.1} s", page.display(), began.elapsed().as_secs_f64()));
+    if !args.quiet {
+        report::say(&format!("wrote {} in {:.1} s", page.display(), began.elapsed().as_secs_f64()));
+    }
     Ok(())
 }
 
-fn check_page(page: &Path, force: bool) -> Result<()> {
-    let is_foreign = std::fs::read(page).is_ok_and(|bytes| !bytes.starts_with(TITLE.as_bytes()));
-    if is_foreign && !force {
-        let path = page.display();
-        return Err(Error::Usage(format!(
-            "{path} exists and is no gallery; name another folder, or replace it with --force"
-        )));
+/// Refuses a folder that holds anything but a gallery: its sheets have names that other pictures may have, too.
+fn check_folder(folder: &Path, page: &Path, force: bool) -> Result<()> {
+    let is_gallery = std::fs::read(page).is_ok_and(|bytes| bytes.starts_with(TITLE.as_bytes()));
+    let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
+    if is_gallery || is_empty || force {
+        return Ok(());
     }
-    Ok(())
+    Err(Error::Usage(format!(
+        "{} holds files that are no gallery; name another folder, or add to it with --force",
+        folder.display()
+    )))
 }
 
 fn read(path: &Path) -> Result<Arc<Target>> {

@@ -116,7 +116,7 @@ impl EvolveOptions {
             scheme: scheme(args)?,
             time_limit: args.time,
             computing: args.computing.check(validation)?,
-            progress: progress(args),
+            progress: args.progress.unless(args.quiet),
             verbosity: verbosity(args),
         };
         if options.look.changes_at_restart() && options.scheme.restarts == 0 {
@@ -187,10 +187,6 @@ fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
         ..PaperScheme::default()
     };
     args.variation.apply(scheme, args.init.is_some())
-}
-
-fn progress(args: &EvolveArgs) -> ProgressKind {
-    if args.quiet && args.progress == ProgressKind::Auto { ProgressKind::None } else { args.progress }
 }
 
 fn verbosity(args: &EvolveArgs) -> Verbosity {

@@ -127,7 +127,7 @@ fn figures_refuse_what_they_cannot_use_and_touch_no_foreign_folder() {
 #[test]
 fn the_gallery_shows_every_shader_with_every_mask() {
     let workshop = Workshop::new();
-    assert_done(&workshop.run("gallery photo.png -o gallery --births 5 --progress none"));
+    assert_done(&workshop.run("gallery photo.png -o gallery --births 5 --quiet"));
     let page = String::from_utf8(workshop.read("gallery/README.md")).expect("it is UTF-8");
     for mask in ["square", "border", "lines", "flower", "disc", "triangle", "hexagon", "brush"] {
         assert!(page.contains(&format!("| `{mask}` |")), "{mask}");
@@ -136,8 +136,10 @@ fn the_gallery_shows_every_shader_with_every_mask() {
         assert!(page.contains(&format!("]({shader}.jpg)")), "{shader}");
         assert_eq!(workshop.pixels(&format!("gallery/{shader}.jpg")).dimensions(), (8 * 264 + 8, 264 + 8));
     }
-    workshop.write("gallery/README.md", b"mine");
-    let ran = workshop.run("gallery photo.png -o gallery --births 5");
+    assert_done(&workshop.run("gallery photo.png -o gallery --births 0 --quiet"));
+    std::fs::create_dir(workshop.path("mine")).expect("the folder is created");
+    workshop.write("mine/flat.jpg", b"mine");
+    let ran = workshop.run("gallery photo.png -o mine --births 0");
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
-    assert_eq!(workshop.read("gallery/README.md"), b"mine");
+    assert_eq!(workshop.read("mine/flat.jpg"), b"mine");
 }

@@ -32,6 +32,7 @@ impl Folder {
             )));
         }
         create(root, root)?;
+        output::check_writable(&root.join("index.html"))?;
         let software = format!("smalti {}", env!("CARGO_PKG_VERSION"));
         Ok(Self { root: root.to_owned(), metadata: vec![("Software".to_owned(), software)] })
     }

@@ -143,8 +143,7 @@ fn try_make(args: &PaperArgs) -> Result<()> {
     let overwrite = if args.force { Overwrite::Force } else { Overwrite::Refuse };
     let folder = Folder::open(&args.output, overwrite)?;
     let device = args.computing.begin(if args.quiet { Verbosity::Quiet } else { Verbosity::Normal })?;
-    let quiet = args.quiet && args.progress == ProgressKind::Auto;
-    let progress = Progress::new(if quiet { ProgressKind::None } else { args.progress });
+    let progress = Progress::new(args.progress.unless(args.quiet));
     let began = Instant::now();
     let study = Study::new(&device, &interrupt, progress);
     let bench = Workbench { study: &study, pictures: images, folder, births: args.births, seed: args.seed };

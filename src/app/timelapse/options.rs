@@ -146,11 +146,7 @@ impl TimelapseOptions {
             hold_cs: ((args.hold * 100.0).round() as u16).max(shortest_cs),
             plays: in_range("--loop", args.plays, (0, u64::from(u16::MAX)))? as u16,
             computing: args.computing.check(Validation::Off)?,
-            progress: if args.quiet && args.progress == ProgressKind::Auto {
-                ProgressKind::None
-            } else {
-                args.progress
-            },
+            progress: args.progress.unless(args.quiet),
             is_quiet: args.quiet,
         })
     }
