@@ -48,7 +48,7 @@ impl Job {
         let Loaded { mut photo, original_width_px, original_height_px, sha256, warnings } =
             photo::read(&options.input, &reading)?;
         let palette = reduce_colors(&mut photo, &options.colors)?;
-        let dress = dress(options)?;
+        let dress = dress(options, init.as_ref())?;
         let mut scheme = options.scheme.clone();
         if let Some(dress) = &dress {
             scheme.masks.clone_from(&dress.layers_by_run);
@@ -111,12 +111,14 @@ impl Job {
 }
 
 /// The masks that were asked for, unless they are those that flies wear anyway.
-fn dress(options: &EvolveOptions) -> Result<Option<Dress>> {
+fn dress(options: &EvolveOptions, init: Option<&Population>) -> Result<Option<Dress>> {
     if options.look.is_default() {
         return Ok(None);
     }
-    let dress = options.look.dress()?;
-    Ok(if options.init.is_none() && dress.is_plain() { None } else { Some(dress) })
+    if let Some(population) = init {
+        return options.look.dress_over(&population.masks).map(Some);
+    }
+    Ok(Some(options.look.dress()?).filter(|dress| !dress.is_plain()))
 }
 
 /// Reduces the picture to the colours asked for; returns those that the tiles are held to, too.

@@ -47,11 +47,15 @@ pub(super) struct Look {
     opacity: NonZeroU8,
 }
 
+/// Why a population's own masks stay as they are.
+pub(super) const KEEPS_MASKS: &str =
+    "a population keeps its masks as they were shaded and blended; name the mask to change to with --mask";
+
 /// The masks of an evolution, and who wears them when.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Dress {
     pub masks: MaskSet,
-    /// Layers of `masks` that flies wear, by run; later runs wear the last.
+    /// Layers of `masks` that flies wear, by run; later runs wear the last, and an empty entry is what they wear already.
     pub layers_by_run: Vec<Vec<u16>>,
 }
 
@@ -112,19 +116,61 @@ impl Look {
     /// # Errors
     /// If a mask cannot be read, or covers nothing.
     pub(super) fn dress(&self) -> Result<Dress> {
-        let square = [PathBuf::from(BuiltIn::Square.name())];
-        let first: &[PathBuf] = if self.masks.is_empty() { &square } else { &self.masks };
-        let outfits: Vec<Outfit> = first
-            .iter()
-            .chain(&self.restart_masks)
-            .map(|name| Ok(Outfit { template: Template::find(name)?, shader: self.shader }))
-            .collect::<Result<_>>()?;
-        let Wardrobe { masks, layers } = Wardrobe::new(&outfits, self.blend, self.opacity)?;
-        let (first, later) = layers.split_at(first.len());
+        let first = if self.masks.is_empty() { vec![self.plain_outfit()] } else { self.outfits(&self.masks)? };
+        let later = self.outfits(&self.restart_masks)?;
+        let first_count = first.len();
+        let Wardrobe { masks, layers } = Wardrobe::new(&[first, later].concat(), self.blend, self.opacity)?;
+        let (first, later) = layers.split_at(first_count);
         let mut layers_by_run = vec![first.to_vec()];
         if !later.is_empty() {
             layers_by_run.push(later.to_vec());
         }
         Ok(Dress { masks, layers_by_run })
+    }
+
+    /// As [`Look::dress`], for flies that come in masks of their own and keep them until they are told to change.
+    ///
+    /// # Errors
+    /// As [`Look::dress`], and [`Error::Usage`] if what was asked for cannot be done to masks that are there.
+    pub(super) fn dress_over(&self, worn: &MaskSet) -> Result<Dress> {
+        if !self.masks.is_empty() {
+            return self.dress();
+        }
+        if self.restart_masks.is_empty() || self.blend != worn.blend() {
+            return Err(Error::Usage(KEEPS_MASKS.to_owned()));
+        }
+        let Wardrobe { masks, layers } = Wardrobe::new(&self.outfits(&self.restart_masks)?, self.blend, self.opacity)?;
+        let shift = worn.layers().len() as u16 - 1;
+        let shifted = layers.into_iter().map(|layer| if layer == 0 { 0 } else { layer + shift }).collect();
+        let others = worn.layers().iter().skip(1).chain(masks.layers().iter().skip(1)).cloned().collect();
+        let masks = MaskSet::with_layers(others)?.with_blend(self.blend);
+        Ok(Dress { masks, layers_by_run: vec![Vec::new(), shifted] })
+    }
+
+    fn outfits(&self, names: &[PathBuf]) -> Result<Vec<Outfit>> {
+        names.iter().map(|name| Ok(Outfit { template: Template::find(name)?, shader: self.shader })).collect()
+    }
+
+    /// What flies wear that were given no mask: the square, shaded only if it is all that there is.
+    fn plain_outfit(&self) -> Outfit {
+        let shader = if self.restart_masks.is_empty() { self.shader } else { Shader::Flat };
+        Outfit { template: BuiltIn::Square.template(), shader }
+    }
+
+    /// The masks, their shader and how they are blended, for people.
+    pub(super) fn describe(&self) -> String {
+        let list = |names: &[PathBuf]| {
+            let names: Vec<String> = names.iter().map(|name| name.display().to_string()).collect();
+            if names.is_empty() { BuiltIn::Square.name().to_owned() } else { names.join(" and ") }
+        };
+        let mut told = list(&self.masks);
+        if self.changes_at_restart() {
+            told += &format!(", from the first restart {}", list(&self.restart_masks));
+        }
+        told += &format!(", shader {}", self.shader.name());
+        if self.blend == Blend::Translucent {
+            told += &format!(", translucent, opacity {:.2}", f64::from(self.opacity.get()) / 255.0);
+        }
+        told
     }
 }

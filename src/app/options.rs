@@ -120,7 +120,12 @@ impl EvolveOptions {
             verbosity: verbosity(args),
         };
         if options.look.changes_at_restart() && options.scheme.restarts == 0 {
-            return Err(Error::Usage("--restart-mask needs a restart; add --restarts".to_owned()));
+            let sentence = if args.restart_masks.is_empty() {
+                "this preset changes its masks at a restart; drop --restarts 0"
+            } else {
+                "--restart-mask needs a restart; add --restarts"
+            };
+            return Err(Error::Usage(sentence.to_owned()));
         }
         if args.json {
             check_stdout_is_free(&options.outputs)?;

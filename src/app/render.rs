@@ -14,7 +14,7 @@ use super::computing::{Computing, ComputingArgs};
 use super::destination::{self, Destination};
 use super::device::{Opened, Selected};
 use super::interrupt::Interrupt;
-use super::look::{Dress, Look, LookArgs};
+use super::look::{Dress, KEEPS_MASKS, Look, LookArgs};
 use super::options::{self, Overwrite, Verbosity};
 use super::outputs::{self, Drawn, SUPERSAMPLING_MAX, Told, View};
 use super::provenance::{self, Provenance};
@@ -151,9 +151,7 @@ impl RenderOptions {
 /// The masks that were asked for, if any.
 fn look(args: &LookArgs) -> Result<Option<Look>> {
     if args.masks.is_empty() && (args.shader.is_some() || args.blend.is_some() || args.opacity.is_some()) {
-        let sentence =
-            "a population keeps its masks as they were shaded and blended; name the mask to draw with --mask";
-        return Err(Error::Usage(sentence.to_owned()));
+        return Err(Error::Usage(KEEPS_MASKS.to_owned()));
     }
     if args.masks.is_empty() { Ok(None) } else { Look::new(args, &[], None).map(Some) }
 }

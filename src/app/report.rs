@@ -11,6 +11,7 @@ use super::device::Selected;
 use super::interrupt::EXIT_INTERRUPTED;
 use super::job::Job;
 use super::options::{EvolveOptions, Verbosity};
+use super::scheme;
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
 
@@ -161,6 +162,9 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
         say(&format!("SHA-256 of the input {}", job.input_sha256));
         say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
     }
+    if let Some(look) = look_line(options, job) {
+        say(&look);
+    }
     let partial = if row.status == Status::Partial {
         " (partial; the same command starts over, and --init goes on from a .npz)"
     } else {
@@ -184,6 +188,9 @@ pub(super) fn print_plan(row: &Row, options: &EvolveOptions, job: &Job, memory_b
         row.scheme,
         row.seed
     ));
+    if let Some(look) = look_line(options, job) {
+        say(&format!("looks      {look}"));
+    }
     if let Some(limit) = options.time_limit {
         say(&format!("time       at most {} s", limit.as_secs_f64()));
     }
@@ -191,6 +198,18 @@ pub(super) fn print_plan(row: &Row, options: &EvolveOptions, job: &Job, memory_b
     say(&format!("device     {}", row.device.as_deref().unwrap_or_default()));
     say(&format!("would write {}", row.output.join(", ")));
     say(&format!("key        {}", row.key.as_deref().unwrap_or_default()));
+}
+
+/// What was asked for beyond plain tiles in evolved colours, if anything was.
+fn look_line(options: &EvolveOptions, job: &Job) -> Option<String> {
+    let mut told = Vec::new();
+    if job.dress.is_some() {
+        told.push(options.look.describe());
+    }
+    told.extend(job.color_count.map(|count| format!("{count} colours")));
+    told.extend(job.scheme.color.palette.as_ref().map(|palette| format!("palette of {}", palette.colors().len())));
+    told.extend(scheme::told(&job.scheme));
+    (!told.is_empty()).then(|| told.join("; "))
 }
 
 /// The input with its sizes: as read, and as evolved if that is smaller.

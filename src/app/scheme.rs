@@ -160,6 +160,25 @@ pub(super) fn decisive(scheme: &PaperScheme) -> Map<String, Value> {
     told
 }
 
+/// The parameters that differ from their defaults, for people; masks and palette are told elsewhere.
+pub(super) fn told(scheme: &PaperScheme) -> Vec<String> {
+    let usual = PaperScheme::default();
+    let share = |q16: u32| {
+        format!("{:.4}", f64::from(q16) / f64::from(ONE_Q16)).trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
+    let parts = [
+        (scheme.cool_q16 != usual.cool_q16, format!("steps x{} at each restart", share(scheme.cool_q16))),
+        (scheme.color.mode != usual.color.mode, format!("colours by {}", color_mode_name(scheme.color.mode))),
+        (scheme.mutation_q16 != usual.mutation_q16, format!("mutation {}", share(scheme.mutation_q16))),
+        (scheme.crossover_q16 != usual.crossover_q16, format!("crossover {}", share(scheme.crossover_q16))),
+        (scheme.new_blood_q16 != usual.new_blood_q16, format!("new blood {}", share(scheme.new_blood_q16))),
+        (scheme.mitosis != usual.mitosis, format!("mitosis {}", scheme.mitosis)),
+        (scheme.rotation != usual.rotation, "no rotation".to_owned()),
+        (scheme.tile_scale_q16 != usual.tile_scale_q16, format!("tile scale {}", share(scheme.tile_scale_q16))),
+    ];
+    parts.into_iter().filter(|(differs, _)| *differs).map(|(_, part)| part).collect()
+}
+
 fn color_mode_name(mode: ColorMode) -> &'static str {
     match mode {
         ColorMode::Evolved => "evolved",

@@ -100,3 +100,49 @@ fn looks_that_make_no_sense_are_refused_in_one_sentence() {
         assert!(!workshop.files().contains("x.png"), "{flags}");
     }
 }
+
+/// The masks that the flies of a population file wear, and how many it has.
+fn worn(workshop: &Workshop, name: &str) -> (BTreeSet<u16>, usize) {
+    let archive = smalti::archive::read(&workshop.path(name)).expect("it is a population");
+    let worn = archive.population.flies.iter().map(|fly| fly.mask).collect();
+    (worn, archive.population.masks.layers().len())
+}
+
+#[test]
+fn a_population_keeps_its_masks_until_it_is_told_to_change() {
+    let workshop = Workshop::new();
+    workshop.evolve("--mask disc -o disc.npz");
+    let go_on = |flags: &str| workshop.run(&format!("evolve photo.png --init disc.npz --births 40 {flags}"));
+    assert_eq!(go_on("-o kept.npz").code, Some(0));
+    assert_eq!(worn(&workshop, "kept.npz"), (BTreeSet::from([1]), 2));
+    let later = "--restarts 1 --restart-mask flower,square";
+    assert_eq!(go_on(&format!("{later} -o later.npz")).code, Some(0));
+    assert_eq!(worn(&workshop, "later.npz"), (BTreeSet::from([0, 2]), 3), "disc, then flower and square");
+    assert_eq!(go_on("--mask square -o square.npz").code, Some(0));
+    assert_eq!(worn(&workshop, "square.npz").0, BTreeSet::from([0]));
+    for flags in ["--shader emboss", "--opacity 0.5", "--blend translucent --restarts 1 --restart-mask flower"] {
+        let ran = go_on(&format!("{flags} -o x.npz"));
+        assert_eq!(ran.code, Some(2), "{flags}: {}", ran.stderr);
+        assert!(ran.stderr.contains("keeps its masks"), "{flags}: {}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_shader_shades_the_masks_that_are_named_and_the_rectangles_of_the_first_run_stay_plain() {
+    let workshop = Workshop::new();
+    workshop.evolve("--preset paper-9 --shader emboss -o first.npz");
+    assert_eq!(worn(&workshop, "first.npz").1, 2, "the square and the embossed flower");
+    workshop.evolve("--shader emboss -o embossed.npz");
+    assert_eq!(worn(&workshop, "embossed.npz"), (BTreeSet::from([1]), 2));
+}
+
+#[test]
+fn a_dry_run_and_the_summary_say_what_was_asked_for() {
+    let workshop = Workshop::new();
+    let flags = "--mask disc --shader soft --opacity 0.5 --colors 9 --color-mode mean --p-crossover 0.25 -o x.png";
+    for ran in [workshop.evolve(&format!("{flags} --dry-run")), workshop.evolve(flags)] {
+        for told in ["disc, shader soft, translucent, opacity 0.50", "9 colours", "colours by mean", "crossover 0.25"] {
+            assert!(ran.stderr.contains(told), "{told}: {}", ran.stderr);
+        }
+    }
+}
