@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::error::ErrorKind;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
@@ -43,7 +43,7 @@ impl Cli {
     pub fn from_command_line() -> Result<Self, ExitCode> {
         Self::try_parse().map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-                report::error(&one_sentence(&error.to_string()));
+                report::error(&one_sentence(&error.to_string(), &command_typed()));
             } else {
                 // Only a closed pipe can fail here: nobody wants the rest of the help.
                 let _ = error.print();
@@ -54,14 +54,23 @@ impl Cli {
 }
 
 /// The first paragraphs of a message of clap in one line, without the usage that follows them.
-fn one_sentence(message: &str) -> String {
+fn one_sentence(message: &str, command: &str) -> String {
     let told = message.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
     let told: Vec<String> = told
         .filter(|line| !line.is_empty() && !line.starts_with("For more information"))
+        // Nothing here takes a value that begins with a minus.
+        .filter(|line| !line.starts_with("tip: to pass '-"))
         .map(|line| line.strip_prefix("tip: ").map_or_else(|| line.to_owned(), |tip| format!("({tip})")))
         .collect();
     let told = told.join(" ");
-    format!("{}; see smalti --help", told.strip_prefix("error: ").unwrap_or(&told))
+    format!("{}; see {command} --help", told.strip_prefix("error: ").unwrap_or(&told))
+}
+
+/// The command that was typed, with its subcommand if that is one.
+fn command_typed() -> String {
+    let first = std::env::args().nth(1).unwrap_or_default();
+    let is_known = Cli::command().get_subcommands().any(|command| command.get_name() == first);
+    if is_known { format!("smalti {first}") } else { "smalti".to_owned() }
 }
 
 #[derive(Debug, Subcommand)]
@@ -125,7 +134,7 @@ pub(super) struct EvolveArgs {
     /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub save_run: Option<PathBuf>,
-    /// Births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 100th of all]
+    /// Most births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 100th of all]
     #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
     pub save_every: Option<u64>,
     /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
@@ -179,7 +188,7 @@ pub(super) struct EvolveArgs {
     #[arg(long, value_name = "R", value_parser = values::count, help_heading = "Evolution")]
     pub restarts: Option<u64>,
     /// Factor of all mutation steps at each restart, 0.00001 to 1
-    #[arg(long, value_name = "F", default_value_t = 1.0, help_heading = "Evolution")]
+    #[arg(long, value_name = "F", value_parser = values::number, default_value_t = 1.0, help_heading = "Evolution")]
     pub cool: f64,
     /// What to do when no bad tile is found: take the worse of two, begin the next run, or stop
     #[arg(long, value_enum, value_name = "ACTION", default_value = "fallback", help_heading = "Evolution")]
@@ -194,7 +203,7 @@ pub(super) struct EvolveArgs {
     #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Evolution")]
     pub time: Option<Duration>,
     /// Number that decides every random choice
-    #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Evolution")]
+    #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0, help_heading = "Evolution")]
     pub seed: u64,
     #[command(flatten)]
     pub variation: SchemeArgs,
@@ -256,8 +265,6 @@ impl ProgressKind {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]
@@ -269,7 +276,8 @@ mod tests {
     fn a_message_of_clap_becomes_one_sentence() {
         let message = "error: unexpected argument '--sed' found\n\n  tip: a similar argument exists: '--seed'\n\n\
                        Usage: smalti evolve <IN>\n\nFor more information, try '--help'.\n";
-        let sentence = "unexpected argument '--sed' found (a similar argument exists: '--seed'); see smalti --help";
-        assert_eq!(one_sentence(message), sentence);
+        let sentence =
+            "unexpected argument '--sed' found (a similar argument exists: '--seed'); see smalti evolve --help";
+        assert_eq!(one_sentence(message, "smalti evolve"), sentence);
     }
 }

@@ -50,7 +50,7 @@ pub(super) struct GalleryArgs {
     #[arg(long, value_name = "B", value_parser = values::count, default_value = "20k")]
     pub births: u64,
     /// Number that decides every random choice
-    #[arg(long, value_name = "S", default_value_t = 0)]
+    #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0)]
     pub seed: u64,
     /// Write into a folder that holds other files, too
     #[arg(long)]

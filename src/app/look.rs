@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::presets::{Preset, Shaders};
+use super::values;
 use crate::error::{Error, Result};
 use crate::model::{Blend, MaskSet};
 use crate::shapes::{BuiltIn, Outfit, Shader, Template, Wardrobe};
@@ -15,18 +16,19 @@ use crate::shapes::{BuiltIn, Outfit, Shader, Template, Wardrobe};
 #[command(next_help_heading = "Tiles")]
 pub(super) struct LookArgs {
     /// Shape of the tiles: square, border, lines, flower, disc, triangle, hexagon, brush, or a PNG or SVG file; several
-    /// with commas or repeated, for a mix [default: square]
+    /// with commas or repeated, for a mix [default: square, or as in the population]
     #[arg(long = "mask", value_name = "NAME|FILE", value_delimiter = ',')]
     pub masks: Vec<PathBuf>,
     /// What the drawing of a mask becomes: template (its own shading), flat, outline, emboss, soft, hollow, negative, fade
-    /// or wash [default: template]
+    /// or wash; for the masks that are named [default: template]
     #[arg(long, value_name = "NAME")]
     pub shader: Option<Shader>,
-    /// Whether a mask's coverage cuts the tile out or is its opacity [default: opaque, or translucent with --opacity]
+    /// Whether a mask's coverage cuts the tile out or is its opacity [default: translucent with --opacity or the shaders
+    /// soft, fade and wash, else opaque]
     #[arg(long, value_enum, value_name = "KIND")]
     pub blend: Option<BlendName>,
     /// Opacity of whole tiles, 0.01 to 1 [default: 1]
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", value_parser = values::number)]
     pub opacity: Option<f64>,
 }
 
@@ -81,7 +83,7 @@ impl Look {
             Some(BlendName::Opaque) if opacity < 1.0 => {
                 return Err(Error::Usage("--opacity below 1 needs --blend translucent, or none".to_owned()));
             }
-            None if opacity < 1.0 => Blend::Translucent,
+            None if opacity < 1.0 || args.shader.is_some_and(Shader::is_translucent) => Blend::Translucent,
             _ => Blend::Opaque,
         };
         // What a preset says of "complex shapes" is not in the paper; any other mask takes its place.

@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::job::Job;
 use super::options::EvolveOptions;
+use super::values;
 use crate::error::{Error, Result};
 use crate::evolve::scheme::{MITOSIS_MAX, ONE_Q16};
 use crate::evolve::{ColorMode, PaperScheme};
@@ -17,19 +18,19 @@ const TILE_SCALES: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 #[derive(Debug, Args)]
 pub(super) struct SchemeArgs {
     /// Probability that a child mutates, 0 to 1; otherwise it is a plain copy
-    #[arg(long, value_name = "P", default_value_t = 1.0, help_heading = "Evolution")]
+    #[arg(long, value_name = "P", value_parser = values::number, default_value_t = 1.0, help_heading = "Evolution")]
     pub p_mutation: f64,
     /// Probability that a child is crossed from two good flies, 0 to 1, before it may mutate
-    #[arg(long, value_name = "P", default_value_t = 0.0, help_heading = "Evolution")]
+    #[arg(long, value_name = "P", value_parser = values::number, default_value_t = 0.0, help_heading = "Evolution")]
     pub p_crossover: f64,
     /// Probability that a fresh random fly is born instead of a child, 0 to 1
-    #[arg(long, value_name = "P", default_value_t = 0.0, help_heading = "Evolution")]
+    #[arg(long, value_name = "P", value_parser = values::number, default_value_t = 0.0, help_heading = "Evolution")]
     pub new_blood: f64,
     /// Begin with N / 2^M tiles, each of which splits in two at each of the first M restarts, 0 to 20
     #[arg(
         long,
         value_name = "M",
-        value_parser = super::values::count,
+        value_parser = values::count,
         default_value = "0",
         help_heading = "Evolution",
         conflicts_with = "init"
@@ -42,7 +43,7 @@ pub(super) struct SchemeArgs {
     #[arg(long, help_heading = "Evolution")]
     pub no_rotation: bool,
     /// First sides over those of the paper's Eq. 1, 0.1 to 100
-    #[arg(long, value_name = "S", default_value_t = 1.0, help_heading = "Evolution")]
+    #[arg(long, value_name = "S", value_parser = values::number, default_value_t = 1.0, help_heading = "Evolution")]
     pub tile_scale: f64,
 }
 

@@ -16,6 +16,16 @@ pub(super) fn count(text: &str) -> Result<u64, String> {
         .ok_or_else(|| "expected a whole number such as 500, 40k or 2M".to_owned())
 }
 
+/// A number with or without decimals, such as `1` or `0.5`; whether it is in range, or a number at all, the flag says.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "expected a number such as 0.5".to_owned())
+}
+
+/// A seed: any whole number of 64 bits.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    whole(text).ok_or_else(|| format!("expected a whole number from 0 to {}", u64::MAX))
+}
+
 /// How many colours a picture keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColorCount {

@@ -59,7 +59,7 @@ pub(in crate::app) struct TimelapseArgs {
     #[arg(long, value_enum, value_name = "WHAT", default_value = "error", help_heading = "Time")]
     pub spacing: Spacing,
     /// How long the last frame is shown, 0 to 600 seconds, but no shorter than the others
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.5, help_heading = "Time")]
+    #[arg(long, value_name = "SECONDS", value_parser = values::number, default_value_t = 1.5, help_heading = "Time")]
     pub hold: f64,
     /// How often a .png, .apng or .gif is played, 0 to 65,535; 0 is without end
     #[arg(long = "loop", value_name = "N", value_parser = values::count, default_value = "0", help_heading = "Time")]
