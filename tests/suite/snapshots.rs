@@ -112,10 +112,9 @@ fn a_folder_of_other_files_or_a_file_is_refused_and_a_missing_folder_is_made() {
     std::fs::create_dir(workshop.path("photos")).unwrap();
     workshop.write("photos/cat.jpg", b"cat");
     workshop.write("notes", b"mine");
-    for (folder, code, words) in [
-        ("photos", 2, "photos holds files that are no snapshots"),
-        ("notes", 1, "notes: cannot be used as a folder"),
-    ] {
+    for (folder, code, words) in
+        [("photos", 2, "photos holds files that are no snapshots"), ("notes", 1, "notes: cannot be used as a folder")]
+    {
         let ran = workshop.run(&format!("evolve photo.png -n 60 --births 300 -o a.png --save-run {folder}"));
         assert_eq!(ran.code, Some(code), "{}", ran.stderr);
         assert!(ran.stderr.contains(words) && ran.stderr.lines().count() == 1, "{}", ran.stderr);

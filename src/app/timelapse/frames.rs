@@ -113,7 +113,11 @@ mod tests {
         assert!(chosen.is_sorted_by(|one, next| one < next), "{chosen:?}");
         assert_eq!((chosen[0], chosen.last()), (0, Some(&199)));
         let (before, after): (Vec<usize>, Vec<usize>) = chosen.iter().partition(|&&index| index < 100);
-        assert_eq!((before.len(), after.len()), (12, 12), "the error falls by the same factor in both runs: {chosen:?}");
+        assert_eq!(
+            (before.len(), after.len()),
+            (12, 12),
+            "the error falls by the same factor in both runs: {chosen:?}"
+        );
     }
 
     #[test]
