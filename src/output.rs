@@ -181,6 +181,14 @@ fn persist(file: NamedTempFile, target: &Path, old: Option<&Metadata>, durabilit
     Ok(())
 }
 
+const DISK_FULL: &str = "the disk is full; free some space, or name a folder on another disk";
+
+/// Whether a failure of this module came of a full disk.
+#[must_use]
+pub fn is_disk_full(error: &Error) -> bool {
+    matches!(error, Error::Output { reason, .. } if reason == DISK_FULL)
+}
+
 fn output_error(path: &Path, error: &io::Error) -> Error {
     use io::ErrorKind::{
         IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull,
@@ -191,7 +199,7 @@ fn output_error(path: &Path, error: &io::Error) -> Error {
         PermissionDenied | ReadOnlyFilesystem => {
             "its folder may not be written to; change its permissions, or name another one".to_owned()
         }
-        StorageFull | QuotaExceeded => "the disk is full; free some space, or name a folder on another disk".to_owned(),
+        StorageFull | QuotaExceeded => DISK_FULL.to_owned(),
         _ => format!("cannot be written ({error}); name another file"),
     };
     Error::output(path, reason)

@@ -16,8 +16,13 @@ pub(super) struct Point {
     pub births: u64,
     /// Global fitness of the population.
     pub sae: u64,
-    /// Global fitness of the best population of this run and those before it.
+    /// Global fitness of the best population since masks changed or tiles split for the last time: it rises there, and
+    /// nowhere else.
     pub best_sae: u64,
+    /// Tiles that take part.
+    pub living: usize,
+    /// How many restarts so far changed the masks.
+    pub mask_changes: u32,
     pub spread: Spread,
 }
 
@@ -62,15 +67,15 @@ impl Curve {
         self.next_run = (run / every_run + 1) * every_run;
     }
 
-    /// The points as CSV; every row ends with the first digits of the result's `key`.
-    pub(super) fn csv(&self, key: &str) -> String {
+    /// The points as CSV; every row ends with the `status` of the evolution and the first digits of the result's `key`.
+    pub(super) fn csv(&self, status: &str, key: &str) -> String {
         let mut text = String::from(CSV_HEADER);
         for point in &self.points {
-            let Point { run, births_in_run, births, sae, best_sae, spread } = point;
+            let Point { run, births_in_run, births, sae, best_sae, spread, .. } = point;
             let clark_evans = spread.clark_evans.map(|index| format!("{index:.6}")).unwrap_or_default();
             let Spread { z, color, log_size, angle, .. } = spread;
             text += &format!(
-                "{run},{births_in_run},{births},{sae},{best_sae},{clark_evans},{z:.6},{color:.6},{log_size:.6},{angle:.6},{key}\n"
+                "{run},{births_in_run},{births},{sae},{best_sae},{clark_evans},{z:.6},{color:.6},{log_size:.6},{angle:.6},{status},{key}\n"
             );
         }
         text
@@ -86,7 +91,7 @@ impl Curve {
             points: self.points.iter().map(|point| (point.births as f64, value(point) as f64)).collect(),
         };
         let restarts = self.points.iter().zip(self.points.iter().skip(1)).filter(|(one, next)| one.run < next.run);
-        let mark = |(_, next): (&Point, &Point)| Mark { x: next.births as f64, label: format!("restart {}", next.run) };
+        let mark = |(one, next): (&Point, &Point)| Mark { x: next.births as f64, label: next.restart_after(one) };
         let values = self.points.iter().flat_map(|point| [point.sae as f64, point.best_sae as f64]);
         Plot {
             title,
@@ -102,7 +107,7 @@ impl Curve {
 
 /// The first line of a curve as CSV.
 pub(super) const CSV_HEADER: &str =
-    "run,births_in_run,births,sae,best_sae,clark_evans,z_spread,color_spread,log_size_spread,angle_spread,key\n";
+    "run,births_in_run,births,sae,best_sae,clark_evans,z_spread,color_spread,log_size_spread,angle_spread,status,key\n";
 
 impl Point {
     /// Where `evolution` stands, once it was evaluated.
@@ -113,8 +118,19 @@ impl Point {
             births: evolution.outcome().births,
             sae: evolution.sae()?,
             best_sae: evolution.best_sae()?,
+            living: evolution.living(),
+            mask_changes: evolution.mask_changes(),
             spread: evolution.spread(),
         })
+    }
+}
+
+impl Point {
+    /// What is said of the restart, or the last of several, between `before` and this point.
+    fn restart_after(&self, before: &Self) -> String {
+        let masks = if self.mask_changes == before.mask_changes { "" } else { ", new masks" };
+        let split = if self.living == before.living { "" } else { ", tiles split" };
+        format!("restart {}{split}{masks}", self.run)
     }
 }
 

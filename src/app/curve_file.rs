@@ -1,7 +1,7 @@
 //! The files of `--curve`: where they may go, and what is in them.
 //!
 //! One rule: a file that is there is replaced if it is a curve of the same command, which its key tells (the last column
-//! of the CSV, the last line of the SVG); any other file only with `--force`.
+//! of the CSV, the last line of the SVG), but a whole curve not by a partial one; any other file only with `--force`.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -12,11 +12,11 @@ use super::curve::{CSV_HEADER, Curve};
 use super::destination::{self, Destination};
 use super::interrupt::Interrupt;
 use super::options::Overwrite;
+use super::report::Status;
+use crate::archive::KEY_DIGITS;
 use crate::error::{Error, Result};
 use crate::output;
 
-/// Digits of the result's key that a curve holds.
-const KEY_DIGITS: usize = 16;
 /// Most bytes of a file that are looked at to see whether it is a curve: many times what one has.
 const BYTES_MAX: u64 = 1 << 24;
 
@@ -53,11 +53,28 @@ impl CurveFile {
     }
 
     /// What this curve is in this form.
-    fn encode(&self, curve: &Curve, title: &str, key: &str) -> Result<Vec<u8>> {
+    fn encode(&self, curve: &Curve, title: &str, (key, status): (&str, Status)) -> Result<Vec<u8>> {
+        let end = self.form.end(key, status);
         match self.form {
-            Form::Csv => Ok(curve.csv(short(key)).into_bytes()),
-            Form::Svg => Ok(format!("{}\n{}\n", curve.plot(title.to_owned())?.trim_end(), svg_end(key)).into_bytes()),
+            Form::Csv => Ok(curve.csv(word(status), short(key)).into_bytes()),
+            Form::Svg => Ok(format!("{}\n{end}\n", curve.plot(title.to_owned())?.trim_end()).into_bytes()),
         }
+    }
+
+    /// What is there: the text of a file, as far as it matters, if it is text.
+    fn found(&self) -> Option<String> {
+        let mut text = String::new();
+        File::open(&self.path).and_then(|file| file.take(BYTES_MAX).read_to_string(&mut text)).ok().map(|_| text)
+    }
+
+    /// Whether a curve that ended like `status` must not take the place of what is there: the whole curve of the same
+    /// command, while this one was cut.
+    pub(super) fn should_keep(&self, key: &str, status: Status, overwrite: Overwrite) -> bool {
+        if overwrite == Overwrite::Force || status != Status::Partial || !self.path.is_file() {
+            return false;
+        }
+        let end = self.form.end(key, Status::Complete);
+        self.found().is_some_and(|text| text.lines().next_back().is_some_and(|line| line.ends_with(&end)))
     }
 
     /// Refuses to replace a file that is no curve of the same command.
@@ -68,14 +85,14 @@ impl CurveFile {
         if overwrite == Overwrite::Force || !self.path.is_file() {
             return Ok(());
         }
-        let mut text = String::new();
-        let is_text = File::open(&self.path).and_then(|file| file.take(BYTES_MAX).read_to_string(&mut text)).is_ok();
+        let text = self.found().unwrap_or_default();
         let last_line = text.lines().next_back().unwrap_or_default();
-        let (is_curve, is_same) = match self.form {
-            Form::Csv => (text.starts_with(CSV_HEADER), last_line.ends_with(&format!(",{}", short(key)))),
-            Form::Svg => (last_line.starts_with(SVG_END), last_line == svg_end(key)),
+        let is_curve = match self.form {
+            Form::Csv => text.starts_with(CSV_HEADER),
+            Form::Svg => last_line.starts_with(SVG_END),
         };
-        let why = match (is_text && is_curve, is_same) {
+        let mut ends = [Status::Complete, Status::Partial].into_iter().map(|status| self.form.end(key, status));
+        let why = match (is_curve, ends.any(|end| last_line.ends_with(&end))) {
             (true, true) => return Ok(()),
             (true, false) => "made with other options",
             (false, _) => "not made by smalti",
@@ -109,19 +126,21 @@ pub(super) fn check_writable<'a>(
     Ok(())
 }
 
-/// Writes a curve to its files, each in one step, and adds to `written` those that are there now.
+/// Writes a curve to its files, each in one step, and adds to `written` those that are there now; `told` are the key of its
+/// result and how that ended.
 ///
 /// # Errors
 /// The first failure; the files after it are written nevertheless.
 pub(super) fn write(
-    files: &[CurveFile],
-    (curve, title, key): (&Curve, &str, &str),
+    files: &[&CurveFile],
+    (curve, title): (&Curve, &str),
+    told: (&str, Status),
     interrupt: &mut Interrupt,
     written: &mut Vec<String>,
 ) -> Result<()> {
     let mut outcome = Ok(());
     for file in files {
-        let one = file.encode(curve, title, key).and_then(|bytes| {
+        let one = file.encode(curve, title, told).and_then(|bytes| {
             let write = || output::write_atomically(&file.path, &bytes);
             // Into a pipe it may take as long as its reader likes.
             if file.path.metadata().is_ok_and(|found| !found.is_file()) {
@@ -141,8 +160,18 @@ pub(super) fn write(
 /// How the last line of a plot begins.
 const SVG_END: &str = "<!-- smalti curve ";
 
-fn svg_end(key: &str) -> String {
-    format!("{SVG_END}{} -->", short(key))
+impl Form {
+    /// How a file of this form ends, but for the line break.
+    fn end(self, key: &str, status: Status) -> String {
+        match self {
+            Self::Csv => format!(",{},{}", word(status), short(key)),
+            Self::Svg => format!("{SVG_END}{} {} -->", short(key), word(status)),
+        }
+    }
+}
+
+fn word(status: Status) -> &'static str {
+    if status == Status::Partial { "partial" } else { "complete" }
 }
 
 fn short(key: &str) -> &str {

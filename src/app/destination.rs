@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use super::options::Overwrite;
 use super::provenance::{self, Ending};
-use crate::archive;
 use crate::error::{Error, Result};
 use crate::output;
 use crate::photo::WEBP_SIDE_MAX_PX;
@@ -28,7 +27,7 @@ pub(super) enum Content {
     Population,
     /// A table of the flies, with metadata.
     Json,
-    /// A table of the flies and nothing else.
+    /// A table of the flies, with what may be replaced in its last columns.
     Csv,
 }
 
@@ -161,32 +160,17 @@ pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destinat
 }
 
 /// Refuses to replace a file that the same command, perhaps interrupted, would not have written.
-///
-/// A CSV table cannot tell which command wrote it: here any table of flies passes, and [`check_unchanged`] decides once
-/// the new bytes are known.
 pub(super) fn check_replaceable(destination: &Destination, key: &str, overwrite: Overwrite) -> Result<()> {
     if overwrite == Overwrite::Force || !destination.replaces_file() {
         return Ok(());
     }
     let why = match provenance::story_of_file(destination) {
-        Some(found) if found.key == key => return Ok(()),
-        None if destination.content == Content::Csv && archive::is_csv_table(&destination.path) => return Ok(()),
+        Some(found) if found.is_of(key) => return Ok(()),
         Some(_) => "made with other options",
         None => "not made by smalti",
     };
     let path = destination.path.display();
     Err(Error::Usage(format!("{path} exists and was {why}; name another file, or replace it with --force")))
-}
-
-/// Refuses to replace a CSV table by another one.
-pub(super) fn check_unchanged(destination: &Destination, bytes: &[u8], overwrite: Overwrite) -> Result<()> {
-    let may_differ =
-        overwrite == Overwrite::Force || destination.content != Content::Csv || !destination.replaces_file();
-    if may_differ || std::fs::read(&destination.path).is_ok_and(|old| old == bytes) {
-        return Ok(());
-    }
-    let reason = "holds another table, which is kept; name another file, or replace it with --force";
-    Err(Error::output(&destination.path, reason))
 }
 
 /// Whether the file that is there holds a better result of the same command, which must not be lost: a run may end
@@ -195,7 +179,7 @@ pub(super) fn should_keep(destination: &Destination, key: &str, ending: &Ending,
     if overwrite == Overwrite::Force || !destination.replaces_file() {
         return false;
     }
-    provenance::story_of_file(destination).is_some_and(|found| found.key == key && found.is_better_than(ending))
+    provenance::story_of_file(destination).is_some_and(|found| found.is_of(key) && found.is_better_than(ending))
 }
 
 /// Whether the program was begun without a stdout.

@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value};
 
-use super::destination::{self, Content, Destination};
+use super::destination::{Content, Destination};
 use super::interrupt::Interrupt;
-use super::options::{Overwrite, Verbosity};
+use super::options::Verbosity;
 use super::{provenance, report};
 use crate::archive;
 use crate::error::{Error, Result};
@@ -135,7 +135,7 @@ pub(super) fn encode<'a>(outputs: &[&'a Destination], drawn: Drawn, told: &Told)
                 archive::encode(&population, &marginal, &provenance::without_header(told.population.clone()))
             }
             Content::Json => archive::encode_json(&population, &marginal, &told.population),
-            Content::Csv => archive::encode_csv(&population, &marginal),
+            Content::Csv => archive::encode_csv(&population, &marginal, &told.population),
         }?;
         Ok(EncodedFile { destination, bytes })
     };
@@ -146,23 +146,16 @@ pub(super) fn encode<'a>(outputs: &[&'a Destination], drawn: Drawn, told: &Told)
 ///
 /// # Errors
 /// The first failure; the files after it are written nevertheless, since hours of work may be in them.
-pub(super) fn write(
-    files: &[EncodedFile<'_>],
-    overwrite: Overwrite,
-    interrupt: &mut Interrupt,
-    written: &mut Vec<String>,
-) -> Result<()> {
+pub(super) fn write(files: &[EncodedFile<'_>], interrupt: &mut Interrupt, written: &mut Vec<String>) -> Result<()> {
     let mut outcome = Ok(());
     for EncodedFile { destination, bytes } in files {
-        let one = destination::check_unchanged(destination, bytes, overwrite).and_then(|()| {
-            if destination.is_stdout() {
-                report::write_picture_to_stdout(bytes)
-            } else if destination.is_stream() {
-                output::write_atomically(&destination.path, bytes)
-            } else {
-                interrupt.while_writing(|| output::write_atomically(&destination.path, bytes))
-            }
-        });
+        let one = if destination.is_stdout() {
+            report::write_picture_to_stdout(bytes)
+        } else if destination.is_stream() {
+            output::write_atomically(&destination.path, bytes)
+        } else {
+            interrupt.while_writing(|| output::write_atomically(&destination.path, bytes))
+        };
         if one.is_ok() {
             written.push(destination.path.display().to_string());
         }

@@ -197,23 +197,33 @@ pub(super) fn without_header(mut told: Map<String, Value>) -> Map<String, Value>
 /// What a file tells about the result in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Story {
+    /// At least its first digits.
     pub key: String,
     /// Whether its evolution came to its end.
     pub is_complete: bool,
     /// None for a fitted picture.
     pub sae: Option<u64>,
+    /// None for a fitted picture.
+    pub restarts_made: Option<u64>,
 }
 
 impl Story {
+    /// Whether the file is of what has this key.
+    pub(super) fn is_of(&self, key: &str) -> bool {
+        self.key.len() >= archive::KEY_DIGITS && key.starts_with(&self.key)
+    }
+
     /// Whether the file should stay rather than make room for a result with the same key that ended like `ending`.
     ///
-    /// Both are cut from one course of births, so the lower SAE is the one that got farther.
+    /// Both are cut from one course of births, so the one of a later run got farther, and within a run the one of the lower
+    /// SAE. SAEs of different runs tell nothing: masks may have changed between them, or tiles split.
     pub(super) fn is_better_than(&self, ending: &Ending) -> bool {
         let new_is_complete = ending.status == Status::Complete;
         if self.is_complete != new_is_complete {
             return self.is_complete;
         }
-        self.sae.is_some_and(|sae| sae < ending.sae)
+        let (old_runs, new_runs) = (self.restarts_made.unwrap_or_default(), u64::from(ending.outcome.restarts));
+        old_runs > new_runs || old_runs == new_runs && self.sae.is_some_and(|sae| sae < ending.sae)
     }
 }
 
@@ -226,13 +236,15 @@ pub(super) fn story_of_file(destination: &Destination) -> Option<Story> {
         Content::Png | Content::Jpeg | Content::WebP => picture_description(photo::read_metadata(path)).ok()??,
         Content::OpenRaster => picture_description(openraster::read_metadata(path)).ok()??,
         Content::Svg => vector::read_meta(path).ok()??,
-        Content::Csv => return None,
+        Content::Csv => archive::read_csv_meta(path).ok()??,
     };
     let text = |key| told.get(key).and_then(Value::as_str);
-    let key = text("key").filter(|_| text("software") == Some(SOFTWARE))?.to_owned();
+    let is_ours = destination.content == Content::Csv || text("software") == Some(SOFTWARE);
+    let key = text("key").filter(|_| is_ours)?.to_owned();
+    let number = |key| told.get(key).and_then(Value::as_u64);
     // An unknown word is a result that somebody may want to keep.
     let is_complete = text("status") != Some("partial");
-    Some(Story { key, is_complete, sae: told.get("sae").and_then(Value::as_u64) })
+    Some(Story { key, is_complete, sae: number("sae"), restarts_made: number("restarts_made") })
 }
 
 fn picture_description(metadata: Result<Metadata>) -> Result<Option<Map<String, Value>>> {
@@ -287,25 +299,35 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_two_results_of_one_command_the_complete_one_is_better_and_then_the_lower_sae() {
-        let ending = |status, sae| Ending {
+    fn of_two_results_of_one_command_the_complete_one_is_better_then_the_later_run_then_the_lower_sae() {
+        use Status::{Complete, Partial};
+        let ending = |status, restarts, sae| Ending {
             status,
             stop: StopReason::Time,
             sae,
-            outcome: Outcome::default(),
+            outcome: Outcome { restarts, ..Outcome::default() },
             births_in_last_run: 0,
         };
-        let story = |is_complete, sae| Story { key: String::new(), is_complete, sae: Some(sae) };
-        for (is_complete, old_sae, status, new_sae, stays) in [
-            (true, 9, Status::Partial, 8, true),
-            (false, 8, Status::Complete, 9, false),
-            (true, 8, Status::Complete, 9, true),
-            (true, 9, Status::Complete, 8, false),
-            (true, 9, Status::Complete, 9, false),
-            (false, 8, Status::Partial, 9, true),
+        let story = |is_complete, restarts_made, sae| Story {
+            key: String::new(),
+            is_complete,
+            sae: Some(sae),
+            restarts_made: Some(restarts_made),
+        };
+        for (is_complete, old, status, new, stays) in [
+            (true, (0, 9), Partial, (0, 8), true),
+            (false, (0, 8), Complete, (0, 9), false),
+            (true, (0, 8), Complete, (0, 9), true),
+            (true, (0, 9), Complete, (0, 8), false),
+            (true, (0, 9), Complete, (0, 9), false),
+            (false, (0, 8), Partial, (0, 9), true),
+            (false, (0, 8), Partial, (1, 9), false),
+            (false, (1, 9), Partial, (0, 8), true),
+            (true, (0, 8), Complete, (1, 9), false),
+            (true, (1, 9), Complete, (0, 8), true),
         ] {
-            let is_better = story(is_complete, old_sae).is_better_than(&ending(status, new_sae));
-            assert_eq!(is_better, stays, "{is_complete} {old_sae}, then {status:?} {new_sae}");
+            let is_better = story(is_complete, old.0, old.1).is_better_than(&ending(status, new.0, new.1));
+            assert_eq!(is_better, stays, "{is_complete} {old:?}, then {status:?} {new:?}");
         }
     }
 }

@@ -4,6 +4,7 @@
 //! machine. A thread of its own encodes and writes; the evolution copies its flies and waits only if that thread falls
 //! behind, so memory stays flat.
 
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
@@ -65,8 +66,15 @@ impl Recorder {
         let (queue, passed) = sync_channel::<Passed>(QUEUE_LENGTH);
         let writing = save_run.clone();
         let writer = std::thread::Builder::new().name("snapshots".to_owned()).spawn(move || {
-            let mut population = stage;
-            passed.into_iter().try_for_each(|passed| write(&writing, &mut population, &told, passed))
+            let (mut population, mut made) = (stage, Vec::new());
+            let written = passed.into_iter().try_for_each(|passed| {
+                let path = writing.path_of(passed.births);
+                let is_new = !path.exists();
+                write(&path, &mut population, &told, passed)?;
+                made.extend(is_new.then_some(path));
+                Ok(())
+            });
+            written.map_err(|error| make_room(&writing.folder, &made, error))
         });
         let writer = writer.map_err(|error| {
             Error::output(&save_run.folder, format!("no thread can be started to write to it ({error})"))
@@ -113,7 +121,7 @@ impl Recorder {
 
     fn take(&mut self, evolution: &Evolution) {
         let births = evolution.outcome().births;
-        // No birth, no other best population: what is due and the end of a run may fall together.
+        // What is due and the end of a run may fall together; a best population that begins anew there is kept at the next.
         if self.last.replace(births) == Some(births) {
             return;
         }
@@ -132,7 +140,21 @@ fn next_due(births: u64, every: u64) -> u64 {
     multiple.min(births.saturating_add(early))
 }
 
-fn write(save_run: &SaveRun, population: &mut Population, told: &Map<String, Value>, passed: Passed) -> Result<()> {
+/// Removes the snapshots that were `made` if the disk is full, since the result of the evolution needs room on it, too;
+/// returns `error`, or what is to be said instead.
+fn make_room(folder: &Path, made: &[PathBuf], error: Error) -> Error {
+    if !output::is_disk_full(&error) {
+        return error;
+    }
+    let removed = made.iter().filter(|path| std::fs::remove_file(path).is_ok()).count();
+    let reason = format!(
+        "the disk is full, and the {removed} new snapshots were removed to leave room for the result; free some space, or \
+         name a folder on another disk"
+    );
+    Error::output(folder, reason)
+}
+
+fn write(path: &Path, population: &mut Population, told: &Map<String, Value>, passed: Passed) -> Result<()> {
     let mut told = told.clone();
     told.insert("status".to_owned(), "snapshot".into());
     told.insert("births".to_owned(), passed.births.into());
@@ -140,7 +162,7 @@ fn write(save_run: &SaveRun, population: &mut Population, told: &Map<String, Val
     told.insert("sae".to_owned(), passed.sae.into());
     told.sort_keys();
     population.flies = passed.flies;
-    output::write_atomically_soon(&save_run.path_of(passed.births), &archive::encode_snapshot(population, &told)?)
+    output::write_atomically_soon(path, &archive::encode_snapshot(population, &told)?)
 }
 
 #[cfg(test)]

@@ -51,6 +51,11 @@ pub(super) struct Row {
     /// Index of Clark and Evans of the tiles' positions: 1 is random, less is clustered.
     pub spread: Option<f64>,
     pub tiles: Option<usize>,
+    /// Tiles of the result that live: fewer than `tiles` before the last split.
+    pub living: Option<usize>,
+    /// Whether the evolution was cut in a run before masks change or tiles split.
+    #[serde(skip)]
+    pub is_warming_up: bool,
     pub births: u64,
     /// Births of the last run, which is the one that the clock or an interrupt cut.
     pub births_in_last_run: u64,
@@ -87,6 +92,8 @@ impl Row {
             psnr: None,
             spread: None,
             tiles: None,
+            living: None,
+            is_warming_up: false,
             births: 0,
             births_in_last_run: 0,
             evals: 0,
@@ -109,6 +116,8 @@ impl Row {
         self.stop = evolution.stop_reason().map(crate::evolve::StopReason::word);
         self.sae = evolution.best_sae();
         self.objective = self.sae;
+        self.living = Some(evolution.best_flies().iter().filter(|fly| fly.alive).count());
+        self.is_warming_up = evolution.is_warming_up();
         self.births = outcome.births;
         self.births_in_last_run = evolution.births_in_run();
         self.evals = outcome.births;
@@ -156,7 +165,14 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
         count(births_per_s),
         row.device.as_deref().unwrap_or_default()
     ));
-    say(&format!("seed {}, stopped by {}", row.seed, row.stop.unwrap_or_default()));
+    let warming_up = match row.living.filter(|_| row.is_warming_up) {
+        Some(living) if Some(living) != row.tiles => {
+            format!(" before the last split or change of masks, with {} tiles alive", count(living as u64))
+        }
+        Some(_) => " before the last change of masks".to_owned(),
+        None => String::new(),
+    };
+    say(&format!("seed {}, stopped by {}{warming_up}", row.seed, row.stop.unwrap_or_default()));
     if options.verbosity == Verbosity::Verbose {
         say(&format!("read in {:.0} ms, encoded and written in {:.0} ms", row.load_ms, row.save_ms));
         say(&format!("SHA-256 of the input {}", job.input_sha256));

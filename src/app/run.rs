@@ -1,10 +1,12 @@
 //! `smalti evolve`: from options to written files.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use super::cli::EvolveArgs;
 use super::curve::Curve;
+use super::curve_file::CurveFile;
 use super::destination::Destination;
 use super::device::{Opened, Selected};
 use super::interrupt::Interrupt;
@@ -47,6 +49,9 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     options.computing.start_threads()?;
     destination::check_writable(options.destinations(), &options.input)?;
     curve_file::check_writable(&options.curves, options.destinations(), &options.input)?;
+    let written = options.destinations().map(|destination| &destination.path);
+    let mut written = written.chain(options.curves.iter().map(|file| &file.path)).map(PathBuf::as_path);
+    options.save_run.iter().try_for_each(|save_run| save_run.check_place(&mut written, &options.input))?;
     let selected = options.computing.select()?;
     row.device = Some(selected.label().to_owned());
 
@@ -82,10 +87,11 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let outputs = outputs_to_write(options, &provenances, &evolved.ending);
     let mut files = outputs::encode(&outputs, evolved.drawn, &provenances.told(&evolved.ending))?;
     files.extend(result::encode_target(options, &job, &provenances.target)?);
-    let written = outputs::write(&files, options.overwrite, &mut interrupt, &mut row.output);
+    let written = outputs::write(&files, &mut interrupt, &mut row.output);
     let curve_written = curve.map_or(Ok(()), |curve| {
-        let told = (&curve, row.id.as_str(), provenances.population.key());
-        curve_file::write(&options.curves, told, &mut interrupt, &mut row.output)
+        let told = (provenances.population.key(), status);
+        let files = curves_to_write(options, told);
+        curve_file::write(&files, (&curve, row.id.as_str()), told, &mut interrupt, &mut row.output)
     });
     written.and(curve_written)?;
     // A broken record of the course is no reason to lose its result.
@@ -148,13 +154,23 @@ fn outputs_to_write<'a>(
     let (kept, outputs): (Vec<_>, Vec<_>) = options.outputs.iter().partition(|output| {
         destination::should_keep(output, provenances.of_output(output).key(), ending, options.overwrite)
     });
-    if options.verbosity > Verbosity::Quiet {
-        for output in kept {
-            let path = output.path.display();
-            report::say(&format!("smalti: {path} is kept: the same command got farther when it wrote it"));
-        }
-    }
+    kept.iter().for_each(|output| say_kept(options, &output.path));
     outputs
+}
+
+/// The files of the curve without those that hold a whole one, if this one was cut.
+fn curves_to_write<'a>(options: &'a EvolveOptions, (key, status): (&str, Status)) -> Vec<&'a CurveFile> {
+    let (kept, curves): (Vec<_>, Vec<_>) =
+        options.curves.iter().partition(|file| file.should_keep(key, status, options.overwrite));
+    kept.iter().for_each(|file| say_kept(options, &file.path));
+    curves
+}
+
+fn say_kept(options: &EvolveOptions, path: &Path) {
+    if options.verbosity > Verbosity::Quiet {
+        let path = path.display();
+        report::say(&format!("smalti: {path} is kept: the same command got farther when it wrote it"));
+    }
 }
 
 /// Says what somebody should know before the work begins.

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use super::destination::place_of;
 use super::options::{Overwrite, in_range};
 use super::provenance::SOFTWARE;
 use crate::archive;
@@ -49,6 +50,21 @@ impl SaveRun {
     pub(super) fn new(folder: &Path, every: Option<u64>) -> Result<Self> {
         let every = every.map(|births| in_range("--save-every", births, (1, u64::MAX))).transpose()?;
         Ok(Self { folder: folder.to_owned(), every })
+    }
+
+    /// Checks, before anything is read, that the folder is none of the other outputs and not the input.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it is.
+    pub(super) fn check_place<'a>(&self, mut others: impl Iterator<Item = &'a Path>, input: &Path) -> Result<()> {
+        let (place, folder) = (place_of(&self.folder), self.folder.display());
+        if place == place_of(input) {
+            return Err(Error::Usage(format!("{folder} is the input; name another folder for the snapshots")));
+        }
+        if others.any(|other| place_of(other) == place) {
+            return Err(Error::Usage(format!("{folder} is named twice as an output")));
+        }
+        Ok(())
     }
 
     /// Births between two snapshots of an evolution of so many births.

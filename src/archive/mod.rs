@@ -16,7 +16,7 @@ use crate::model::{Blend, Population};
 
 pub use encode::{encode, encode_snapshot};
 pub use read::{read, read_meta};
-pub use table::{encode_csv, encode_json, is_csv_table, read_json_meta};
+pub use table::{KEY_DIGITS, encode_csv, encode_json, read_csv_meta, read_json_meta};
 
 /// Version of the file's layout.
 const SCHEMA: u32 = 1;

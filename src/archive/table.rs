@@ -1,7 +1,8 @@
 //! Populations as tables for other programs: CSV and JSON, one row per fly, with the columns of the `.npz` file.
 //!
 //! Numbers are the shortest decimals that give the same f32 back, so a table is as exact as the `.npz`; `color` repeats
-//! `r g b` as tiles show it. A CSV holds nothing but the table, so it cannot tell how it came to be.
+//! `r g b` as tiles show it. A CSV has no place for metadata but its columns: the last four say in every row what decides
+//! whether the file may be replaced, as `meta` of a JSON table does.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -17,7 +18,11 @@ use crate::model::{Fly, Population};
 use crate::photo;
 
 /// First line of every CSV table.
-const CSV_HEADER: &[u8] = b"x,y,z,r,g,b,w,h,angle,mask,alive,fitness,color\n";
+const CSV_HEADER: &[u8] = b"x,y,z,r,g,b,w,h,angle,mask,alive,fitness,color,status,restarts_made,sae,key\n";
+/// Digits of a key that a row of a table has room for.
+pub const KEY_DIGITS: usize = 16;
+/// Most bytes of the first two lines of a CSV table that are read: many times what they have.
+const HEAD_BYTES_MAX: u64 = 1 << 12;
 /// What the first line of every JSON table begins with; the metadata follows, so that it is known without the rows.
 const JSON_HEAD: &str = "{\"meta\":";
 /// Most bytes of the first line of a JSON table that is read.
@@ -49,6 +54,29 @@ impl Row {
     }
 }
 
+/// The last columns of a CSV; empty where the metadata tells none.
+#[derive(Serialize)]
+struct Told<'a> {
+    status: &'a str,
+    restarts_made: Option<u64>,
+    sae: Option<u64>,
+    key: &'a str,
+}
+
+impl<'a> Told<'a> {
+    fn new(meta: &'a Map<String, Value>) -> Self {
+        let text = |name| meta.get(name).and_then(Value::as_str).unwrap_or_default();
+        let number = |name| meta.get(name).and_then(Value::as_u64);
+        let key = text("key");
+        Self {
+            status: text("status"),
+            restarts_made: number("restarts_made"),
+            sae: number("sae"),
+            key: key.get(..KEY_DIGITS).unwrap_or(key),
+        }
+    }
+}
+
 fn hexadecimal([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
@@ -57,25 +85,43 @@ fn rows<'a>(population: &'a Population, fitness: &'a [i64]) -> impl Iterator<Ite
     population.flies.iter().zip(fitness).map(|(fly, &fitness)| Row::new(fly, fitness))
 }
 
-/// The flies with their marginal fitness as CSV: a line of names, then a line per fly.
+/// The flies with their marginal fitness as CSV: a line of names, then a line per fly, which ends with `status`,
+/// `restarts_made`, `sae` and the first [`KEY_DIGITS`] digits of `key` as `meta` tells them.
 ///
 /// # Errors
 /// [`Error::Internal`] if the rows cannot be spelt.
-pub fn encode_csv(population: &Population, fitness: &[i64]) -> Result<Vec<u8>> {
+pub fn encode_csv(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
+    let told = Told::new(meta);
     let failed = |error: &dyn std::fmt::Display| Error::Internal(format!("no CSV: {error}"));
     let mut csv = csv::WriterBuilder::new().has_headers(false).from_writer(CSV_HEADER.to_vec());
     for row in rows(population, fitness) {
-        csv.serialize(row).map_err(|error| failed(&error))?;
+        csv.serialize((row, &told)).map_err(|error| failed(&error))?;
     }
     csv.into_inner().map_err(|error| failed(&error))
 }
 
-/// Whether the file at `path` begins as a table of [`encode_csv`].
-#[must_use]
-pub fn is_csv_table(path: &Path) -> bool {
+/// What the CSV table at `path` tells of `status`, `restarts_made`, `sae` and `key`, by its first fly; `None` if it is not
+/// one of ours, or has no fly.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read.
+pub fn read_csv_meta(path: &Path) -> Result<Option<Map<String, Value>>> {
     let mut head = Vec::new();
-    let read = File::open(path).and_then(|file| file.take(CSV_HEADER.len() as u64).read_to_end(&mut head));
-    read.is_ok() && head == CSV_HEADER
+    File::open(path)
+        .and_then(|file| file.take(HEAD_BYTES_MAX).read_to_end(&mut head))
+        .map_err(|error| Error::input(path, photo::why_unreadable(&error)))?;
+    let row = head.strip_prefix(CSV_HEADER).and_then(|rows| rows.split(|&byte| byte == b'\n').next());
+    let Some(row) = row.and_then(|row| std::str::from_utf8(row).ok()) else { return Ok(None) };
+    let [key, sae, restarts_made, status] = [0, 1, 2, 3].map(|column| row.rsplit(',').nth(column).unwrap_or_default());
+    let is_key = key.len() == KEY_DIGITS && key.bytes().all(|byte| byte.is_ascii_hexdigit());
+    let number = |text: &str| text.parse::<u64>().map_or(Value::Null, Value::from);
+    let meta = [
+        ("key", Value::from(key)),
+        ("sae", number(sae)),
+        ("restarts_made", number(restarts_made)),
+        ("status", Value::from(status)),
+    ];
+    Ok(is_key.then(|| meta.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()))
 }
 
 /// The flies with their marginal fitness as one JSON object, a fly a line; `meta` goes in under that name.

@@ -86,6 +86,7 @@ pub struct Evolution {
     outcome: Outcome,
     births_in_run: u64,
     births_at_best: u64,
+    mask_changes: u32,
     stop: Option<StopReason>,
 }
 
@@ -117,6 +118,7 @@ impl Evolution {
             outcome: Outcome::default(),
             births_in_run: 0,
             births_at_best: 0,
+            mask_changes: 0,
             stop: None,
         }
     }
@@ -133,7 +135,27 @@ impl Evolution {
         &self.flies
     }
 
-    /// The best population; the current one before the first evaluation.
+    /// Flies that take part; fewer than there are until the last split.
+    #[must_use]
+    pub fn living(&self) -> usize {
+        self.living
+    }
+
+    /// How many restarts so far changed the masks.
+    #[must_use]
+    pub fn mask_changes(&self) -> u32 {
+        self.mask_changes
+    }
+
+    /// Whether the current run, or the last one, is followed by a change of masks or a split, so that its populations are
+    /// not what the result is to be.
+    #[must_use]
+    pub fn is_warming_up(&self) -> bool {
+        self.scheme.is_warm_up(self.outcome.restarts)
+    }
+
+    /// The best population since masks changed or flies split for the last time; the current one before the first
+    /// evaluation.
     #[must_use]
     pub fn best_flies(&self) -> &[Fly] {
         self.best.as_ref().map_or(&self.flies, BestPopulation::flies)
@@ -201,6 +223,9 @@ impl Evolution {
         let left = self.scheme.births - self.births_in_run;
         if left == 0 {
             return self.end_run(StopReason::Births, &lane.scene().target);
+        }
+        if self.has_reached_target() {
+            return self.end_run(StopReason::TargetSae, &lane.scene().target);
         }
         if self.scheme.patience.is_some_and(|patience| self.births_in_run - self.births_at_best >= patience) {
             return self.end_run(StopReason::Patience, &lane.scene().target);
@@ -285,6 +310,7 @@ impl Evolution {
             return false;
         }
         wear(&mut self.flies, layers, self.scheme.seed, run);
+        self.mask_changes += 1;
         self.breeder.set_layers(layers);
         true
     }
@@ -300,9 +326,14 @@ impl Evolution {
         if best.offer(&self.flies, sae) {
             self.births_at_best = self.births_in_run;
         }
-        if self.scheme.target_sae.is_some_and(|target| best.sae() <= target) {
+        // In a run that warms up it ends the run alone, which the next step does.
+        if self.has_reached_target() && !self.is_warming_up() {
             self.stop(StopReason::TargetSae);
         }
+    }
+
+    fn has_reached_target(&self) -> bool {
+        self.scheme.target_sae.is_some_and(|target| self.best_sae().is_some_and(|sae| sae <= target))
     }
 }
 

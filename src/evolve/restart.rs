@@ -1,8 +1,11 @@
-//! The best population by global fitness: always kept, the start of every restart, and the result.
+//! The best population by global fitness: the start of every restart, and the result.
+//!
+//! It is kept from one change of masks or split of the flies to the next: populations from before are not what the result is
+//! to be, so a new best population begins there, whose error may be higher.
 
 use crate::model::Fly;
 
-/// The best population seen, kept up to date without copying whole populations.
+/// The best population seen since it was begun, kept up to date without copying whole populations.
 #[derive(Clone, Debug)]
 pub struct BestPopulation {
     flies: Vec<Fly>,

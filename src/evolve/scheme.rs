@@ -41,7 +41,7 @@ pub struct PaperScheme {
     pub on_dry: OnDry,
     /// Ends a run after this many births without a better population.
     pub patience: Option<u64>,
-    /// Ends the evolution when the global fitness is at most this.
+    /// Ends the evolution when the global fitness is at most this; before the last change of masks or split, only the run.
     pub target_sae: Option<u64>,
     /// Births evaluated together in one generation; 1 is the paper.
     pub batch_births: u32,
@@ -70,6 +70,16 @@ impl PaperScheme {
     pub fn layers(&self, run: u32) -> &[u16] {
         let last = self.masks.len().saturating_sub(1);
         self.masks.get(last.min(run as usize)).map_or(&[], Vec::as_slice)
+    }
+
+    /// Whether masks change or flies split in a run after `run`: its populations are not yet what the result is to be.
+    #[must_use]
+    pub fn is_warm_up(&self, run: u32) -> bool {
+        let last_change = u32::try_from(self.masks.len()).unwrap_or(u32::MAX).saturating_sub(1).min(self.restarts);
+        let now = self.layers(run);
+        let changes_masks = (run.saturating_add(1)..=last_change).map(|later| self.layers(later));
+        let changes_masks = changes_masks.into_iter().any(|later| !later.is_empty() && later != now);
+        run < self.mitosis.min(self.restarts) || changes_masks
     }
 
     /// Flies that live in `run`, of a population with room for `fly_count`: N / 2^mitosis, rounded up, and twice as many
@@ -117,6 +127,22 @@ mod tests {
         assert_eq!(living(0, 2_500), [2_500; 5]);
         assert_eq!(living(2, 5_000), [1_250, 2_500, 5_000, 5_000, 5_000]);
         assert_eq!(living(3, 2_500), [313, 626, 1_252, 2_500, 2_500]);
+    }
+
+    #[test]
+    fn runs_warm_up_until_the_last_change_of_masks_and_the_last_split_that_are_made() {
+        let warm_ups = |scheme: PaperScheme| (0..5).map(|run| scheme.is_warm_up(run)).collect::<Vec<_>>();
+        let plain = PaperScheme { restarts: 4, ..PaperScheme::default() };
+        assert_eq!(warm_ups(plain.clone()), [false; 5]);
+        assert_eq!(warm_ups(PaperScheme { mitosis: 2, ..plain.clone() }), [true, true, false, false, false]);
+        assert_eq!(
+            warm_ups(PaperScheme { mitosis: 2, restarts: 1, ..plain.clone() }),
+            [true, false, false, false, false]
+        );
+        let masks = vec![vec![0], vec![0], vec![1]];
+        assert_eq!(warm_ups(PaperScheme { masks: masks.clone(), ..plain.clone() }), [true, true, false, false, false]);
+        assert_eq!(warm_ups(PaperScheme { masks, restarts: 1, ..plain.clone() }), [false; 5]);
+        assert_eq!(warm_ups(PaperScheme { masks: vec![vec![1]], ..plain }), [false; 5]);
     }
 
     #[test]

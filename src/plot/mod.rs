@@ -76,6 +76,8 @@ impl Plot {
     pub fn svg(&self) -> Result<String> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|reason| Error::Internal(format!("the plot `{}`: {reason}", self.title)))?;
+        // A title may be the name of a file, which may hold anything.
+        text.retain(is_xml);
         Ok(text)
     }
 
@@ -135,6 +137,11 @@ impl Plot {
     }
 }
 
+/// Whether XML 1.0 allows a character at all, escaped or not (section 2.2, production `Char`).
+fn is_xml(character: char) -> bool {
+    matches!(character, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..)
+}
+
 /// Draws marks at their columns across the rows of the plotting area, and their labels above it.
 fn draw_marks<B: DrawingBackend>(
     area: &DrawingArea<B, plotters::coord::Shift>,
@@ -189,6 +196,14 @@ mod tests {
             assert!(svg.contains(words), "{words}");
         }
         assert!(!svg.contains("restart 2"), "its label would lie over the first one");
+    }
+
+    #[test]
+    fn a_plot_parses_whatever_its_words_hold() {
+        let named = Plot { title: "a\u{1}b\u{1b}[1mc\u{0}\u{ffff}\u{7f}\td".to_owned(), ..plot() };
+        let svg = named.svg().expect("there are points");
+        resvg::usvg::Tree::from_str(&svg, &resvg::usvg::Options::default()).expect("it parses");
+        assert!(svg.contains("ab[1mc"), "what may stay stays");
     }
 
     #[test]

@@ -98,3 +98,25 @@ fn the_second_ctrl_c_ends_the_process_at_once_and_leaves_nothing() {
     assert_eq!(status.code(), Some(130), "{messages}");
     assert_eq!(workshop.files(), before);
 }
+
+#[test]
+fn a_partial_table_makes_room_for_the_whole_one_and_no_partial_one_replaces_a_whole() {
+    let workshop = Workshop::new();
+    let command = format!("{ENDLESS} --time 4s -o a.csv --curve curve.csv --curve curve.svg");
+    let names = ["a.csv", "curve.csv", "curve.svg"];
+    let last_line = |name| String::from_utf8(workshop.read(name)).unwrap().lines().next_back().unwrap().to_owned();
+    let all_are = |word: &str| names.iter().all(|name| last_line(name).split([',', ' ']).any(|part| part == word));
+    assert_eq!(interrupted(&workshop, &command, &["INT"]).0.code(), Some(75));
+    assert!(all_are("partial"));
+    let ran = workshop.run(&command);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(all_are("complete"));
+
+    let whole = names.map(|name| workshop.read(name));
+    let (status, messages) = interrupted(&workshop, &command, &["INT"]);
+    assert_eq!(status.code(), Some(75), "{messages}");
+    assert!(names.iter().all(|name| messages.contains(&format!("{name} is kept"))), "{messages}");
+    assert_eq!(names.map(|name| workshop.read(name)), whole);
+    assert_eq!(interrupted(&workshop, &format!("{command} --force"), &["INT"]).0.code(), Some(75));
+    assert!(all_are("partial"));
+}

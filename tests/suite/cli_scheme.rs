@@ -144,3 +144,46 @@ fn values_of_the_scheme_out_of_range_are_refused_with_their_flag() {
         assert_eq!(workshop.files(), before, "{rest} left something behind");
     }
 }
+
+#[test]
+fn a_target_that_is_reached_before_the_last_change_of_masks_or_split_ends_only_that_run() {
+    let workshop = Workshop::new();
+    for (flags, restarts) in [("--restart-mask flower --restarts 3", 1), ("--mitosis 2 --restarts 2", 2)] {
+        let row = workshop.evolve_to_row(&format!("-o a.png --force --target-sae 10M {flags}"));
+        assert_eq!([&row["stop"], &row["status"]], ["target-sae", "complete"], "{flags}");
+        assert_eq!([&row["restarts"], &row["births"], &row["living"]], [restarts, 0, 60], "{flags}");
+    }
+    let row = workshop.evolve_to_row("-o a.png --force --target-sae 10M --restarts 2");
+    assert_eq!([&row["restarts"], &row["births"]], [0, 0], "nothing changes, so the first run will do");
+}
+
+#[test]
+fn a_cut_before_the_last_split_or_change_of_masks_is_told() {
+    let workshop = Workshop::new();
+    let line = "evolve photo.png -n 60 --births 1000M --time 200ms -o a.png --force --json";
+    let ran = workshop.run(&format!("{line} --mitosis 2 --restarts 2"));
+    assert_eq!([&ran.row()["tiles"], &ran.row()["living"]], [60, 15]);
+    let told = "stopped by time before the last split or change of masks, with 15 tiles alive";
+    assert!(ran.stderr.contains(told), "{}", ran.stderr);
+    let ran = workshop.run(&format!("{line} --restarts 1 --restart-mask flower"));
+    assert!(ran.stderr.contains("stopped by time before the last change of masks\n"), "{}", ran.stderr);
+    assert_eq!([&ran.row()["tiles"], &ran.row()["living"]], [60, 60]);
+    let ran = workshop.run(&format!("{line} --restarts 1"));
+    assert!(ran.stderr.contains("stopped by time\n"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_curve_says_at_which_restarts_the_best_population_began_anew() {
+    let workshop = Workshop::new();
+    workshop.evolve("--restarts 2 --mitosis 1 -o a.png --curve split.svg");
+    workshop.evolve("--restarts 2 --restart-mask flower -o b.png --curve masks.svg");
+    workshop.evolve("--restarts 2 --mitosis 1 --restart-mask flower -o c.png --curve both.svg");
+    for (name, label) in [
+        ("split.svg", "restart 1, tiles split\n"),
+        ("masks.svg", "restart 1, new masks\n"),
+        ("both.svg", "restart 1, tiles split, new masks\n"),
+    ] {
+        let plot = String::from_utf8(workshop.read(name)).unwrap();
+        assert!(plot.contains(label) && plot.contains("restart 2\n"), "{name}: {plot}");
+    }
+}

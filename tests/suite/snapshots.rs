@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use smalti::archive::{self, Archive};
 
 use crate::cli_interrupts::interrupted;
+use crate::cli_refusals::refused;
 use crate::workshop::Workshop;
 
 /// The files of a folder by name.
@@ -110,10 +111,10 @@ fn a_folder_of_other_files_or_a_file_is_refused_and_a_missing_folder_is_made() {
     let workshop = Workshop::new();
     std::fs::create_dir(workshop.path("photos")).unwrap();
     workshop.write("photos/cat.jpg", b"cat");
-    for (folder, code, words) in [
-        ("photos", 2, "photos holds files that are no snapshots"),
-        ("photo.png", 1, "photo.png: cannot be used as a folder"),
-    ] {
+    workshop.write("notes", b"mine");
+    for (folder, code, words) in
+        [("photos", 2, "photos holds files that are no snapshots"), ("notes", 1, "notes: cannot be used as a folder")]
+    {
         let ran = workshop.run(&format!("evolve photo.png -n 60 --births 300 -o a.png --save-run {folder}"));
         assert_eq!(ran.code, Some(code), "{}", ran.stderr);
         assert!(ran.stderr.contains(words) && ran.stderr.lines().count() == 1, "{}", ran.stderr);
@@ -137,4 +138,36 @@ fn an_interrupt_leaves_whole_snapshots_up_to_where_it_came() {
     let result = archive::read(&workshop.path("a.npz")).unwrap();
     assert_eq!(last.population, result.population);
     assert_eq!(last.meta["births"], result.meta["births"]);
+}
+
+#[test]
+fn a_folder_that_is_the_input_or_another_output_is_refused() {
+    let workshop = Workshop::new();
+    for (rest, words) in [
+        ("-o same.png --save-run same.png", "same.png is named twice"),
+        ("-o a.png --save-target t.png --save-run ./t.png", "./t.png is named twice"),
+        ("-o a.png --curve c.svg --save-run c.svg", "c.svg is named twice"),
+        ("-o a.png --save-run ./photo.png", "./photo.png is the input"),
+    ] {
+        refused(&workshop, &format!("evolve photo.png {rest}"), 2, words);
+    }
+}
+
+/// A device that is always full stands for a disk that becomes so.
+#[cfg(target_os = "linux")]
+#[test]
+fn on_a_full_disk_new_snapshots_make_room_for_the_result() {
+    let workshop = Workshop::new();
+    let line = "evolve photo.png -n 60 --births 300 -o a.png --save-run run --save-every 100 --force";
+    std::fs::create_dir(workshop.path("run")).unwrap();
+    std::os::unix::fs::symlink("/dev/full", workshop.path("run/000000000200.npz")).unwrap();
+    workshop.write("run/notes.txt", b"mine");
+    let ran = workshop.run(line);
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    assert!(ran.stderr.contains("run: the disk is full, and the "), "{}", ran.stderr);
+    assert!(ran.stderr.contains("new snapshots were removed to leave room for the result"), "{}", ran.stderr);
+    assert_eq!(workshop.pixels("a.png").dimensions(), (40, 30), "the result is written");
+    let left = std::fs::read_dir(workshop.path("run")).unwrap().map(|entry| entry.unwrap().file_name());
+    let left: std::collections::BTreeSet<_> = left.map(|name| name.into_string().unwrap()).collect();
+    assert_eq!(left, ["000000000200.npz", "notes.txt"].map(str::to_owned).into());
 }

@@ -199,6 +199,8 @@ fn what_cannot_be_shown_is_refused_in_one_sentence() {
     std::fs::copy(workshop.path("other/000000000300.npz"), workshop.path("mixed/000000000300.npz")).unwrap();
     std::fs::create_dir(workshop.path("renamed")).unwrap();
     std::fs::copy(workshop.path(&names[0]), workshop.path("renamed/000000000001.npz")).unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("/dev/null", workshop.path("pipe.gif")).unwrap();
     let before = workshop.files();
     for (line, code, words) in [
         ("nowhere -o t.gif", 2, "nowhere: cannot be read as a folder"),
@@ -208,6 +210,9 @@ fn what_cannot_be_shown_is_refused_in_one_sentence() {
         ("renamed -o t.gif", 2, "000000000001.npz: is no snapshot"),
         ("run -o t.avi", 2, "t.avi: an animation must end in .png"),
         ("run -o t.gif -o t.gif", 2, "t.gif is named twice"),
+        ("run -o t.gif -o ./t.gif", 2, "./t.gif is named twice"),
+        #[cfg(unix)]
+        ("run -o pipe.gif", 2, "pipe.gif is a device or a pipe"),
         ("run -o t.gif --fps 60", 2, "--fps 60: a GIF has at most 50"),
         ("run -o t.png --fps 0", 2, "--fps 0: must be 1 to 120"),
         ("run -o t.png --hold=-1", 2, "--hold"),

@@ -18,17 +18,16 @@ pub(in crate::app) enum Spacing {
 /// Indices of the snapshots to show, rising: the first and the last, and between them those that come nearest to an
 /// even course in `frame_count` frames. No snapshot is shown twice, so there may be fewer frames.
 ///
-/// The error falls by a factor rather than by a difference: the eye sees the last 1 % of it go as it sees the first.
+/// The error falls by a factor rather than by a difference: the eye sees the last 1 % of it go as it sees the first. Where
+/// it rises, as when masks change or tiles split, the picture changes as well, so the way up counts like the way down.
 /// Unless asked for more, that makes half as many frames as there are snapshots, since they are too far apart for more
 /// where the error falls fastest.
 pub(super) fn choose(snapshots: &[Snapshot], spacing: Spacing, frame_count: Option<usize>) -> Vec<usize> {
-    let place = |(index, snapshot): (usize, &Snapshot)| match spacing {
-        Spacing::Snapshots => index as f64,
-        Spacing::Births => snapshot.births as f64,
-        // From libm, since frames are a matter of bytes.
-        Spacing::Error => -libm::log(snapshot.sae as f64 + 1.0),
+    let places: Vec<f64> = match spacing {
+        Spacing::Snapshots => (0..snapshots.len()).map(|index| index as f64).collect(),
+        Spacing::Births => snapshots.iter().map(|snapshot| snapshot.births as f64).collect(),
+        Spacing::Error => ways(snapshots),
     };
-    let places: Vec<f64> = snapshots.iter().enumerate().map(place).collect();
     let (Some(&begin), Some(&end)) = (places.first(), places.last()) else { return Vec::new() };
     let usual = match spacing {
         Spacing::Error => snapshots.len().div_ceil(2),
@@ -51,6 +50,18 @@ pub(super) fn choose(snapshots: &[Snapshot], spacing: Spacing, frame_count: Opti
         chosen.push(places.len() - 1);
     }
     chosen
+}
+
+/// How far the error went until each of the snapshots, up or down, in natural logarithms.
+fn ways(snapshots: &[Snapshot]) -> Vec<f64> {
+    // From libm, since frames are a matter of bytes.
+    let logs: Vec<f64> = snapshots.iter().map(|snapshot| libm::log(snapshot.sae as f64 + 1.0)).collect();
+    let steps = logs.iter().enumerate().map(|(index, log)| (log - logs[index.saturating_sub(1)]).abs());
+    let way = |way: &mut f64, step| {
+        *way += step;
+        Some(*way)
+    };
+    steps.scan(0.0, way).collect()
 }
 
 /// The index of the place nearest to `wanted`, of equals the first; `places` never fall.
@@ -91,6 +102,22 @@ mod tests {
         let ratios: Vec<f64> = chosen.windows(2).map(|pair| saes[pair[0]] as f64 / saes[pair[1]] as f64).collect();
         assert_eq!((chosen[0], chosen.last()), (0, Some(&1000)));
         assert!(ratios.iter().all(|ratio| (1.9..2.1).contains(ratio)), "{ratios:?}");
+    }
+
+    #[test]
+    fn a_course_whose_error_rises_is_shown_from_beginning_to_end() {
+        let falling = |from: u64| (0..100).map(move |birth| from / (1 + birth));
+        // The masks change after a hundred births, and the error ends higher than it was before.
+        let saes: Vec<u64> = falling(1_000_000).chain(falling(8_000_000)).collect();
+        let chosen = choose(&course(&saes), Spacing::Error, Some(41));
+        assert!(chosen.is_sorted_by(|one, next| one < next), "{chosen:?}");
+        assert_eq!((chosen[0], chosen.last()), (0, Some(&199)));
+        let (before, after): (Vec<usize>, Vec<usize>) = chosen.iter().partition(|&&index| index < 100);
+        assert_eq!(
+            (before.len(), after.len()),
+            (12, 12),
+            "the error falls by the same factor in both runs: {chosen:?}"
+        );
     }
 
     #[test]

@@ -8,6 +8,7 @@ use clap::Args;
 use super::frames::Spacing;
 use crate::app::cli::ProgressKind;
 use crate::app::computing::{Computing, ComputingArgs};
+use crate::app::destination;
 use crate::app::options::{Overwrite, in_range};
 use crate::app::values;
 use crate::error::{Error, Result};
@@ -161,14 +162,20 @@ impl TimelapseOptions {
         }
     }
 
-    /// Checks that every output can be written, and none is named twice.
+    /// Checks that every output can be written, and none is named twice or is a device or a pipe, which cannot be gone back
+    /// in.
     ///
     /// # Errors
     /// [`Error::Usage`] or [`Error::Output`].
     pub(super) fn check_outputs(&self) -> Result<()> {
         for (index, output) in self.outputs.iter().enumerate() {
-            if self.outputs[..index].iter().any(|other| other.path == output.path) {
-                return Err(Error::Usage(format!("{} is named twice as an output", output.path.display())));
+            let path = output.path.display();
+            let place = destination::place_of(&output.path);
+            if self.outputs[..index].iter().any(|other| destination::place_of(&other.path) == place) {
+                return Err(Error::Usage(format!("{path} is named twice as an output")));
+            }
+            if output.path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+                return Err(Error::Usage(format!("{path} is a device or a pipe; name a file for the animation")));
             }
             output::check_writable(&output.path)?;
         }

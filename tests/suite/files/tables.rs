@@ -1,7 +1,7 @@
 //! Tables of flies for other programs.
 
 use serde_json::{Map, Value, json};
-use smalti::archive::{encode_csv, encode_json, is_csv_table, read_json_meta};
+use smalti::archive::{encode_csv, encode_json, read_csv_meta, read_json_meta};
 use smalti::model::fly::Genes;
 use smalti::model::{Blend, Fly, Population};
 
@@ -9,6 +9,16 @@ use super::archives::{fitness, population};
 use crate::workshop::Workshop;
 
 const COLUMNS: [&str; 13] = ["x", "y", "z", "r", "g", "b", "w", "h", "angle", "mask", "alive", "fitness", "color"];
+
+/// The first line of a CSV table.
+fn names() -> String {
+    format!("{},status,restarts_made,sae,key", COLUMNS.join(","))
+}
+
+fn meta() -> Map<String, Value> {
+    let key = "0123456789abcdef".repeat(4);
+    json!({"key": key, "status": "partial", "restarts_made": 2, "sae": 77}).as_object().unwrap().clone()
+}
 
 /// The fly and its fitness in a row of values as they are spelt.
 fn fly_of(row: &[String]) -> (Fly, i64) {
@@ -28,20 +38,21 @@ fn assert_all_flies(rows: impl Iterator<Item = Vec<String>>) {
 }
 
 #[test]
-fn a_csv_table_has_nothing_but_a_line_of_names_and_a_line_per_fly_and_loses_no_bit() {
-    let csv = encode_csv(&population(), &fitness()).unwrap();
-    assert_eq!(csv, encode_csv(&population(), &fitness()).unwrap());
+fn a_csv_table_has_a_line_of_names_and_a_line_per_fly_and_loses_no_bit() {
+    let csv = encode_csv(&population(), &fitness(), &meta()).unwrap();
+    assert_eq!(csv, encode_csv(&population(), &fitness(), &meta()).unwrap());
     let text = std::str::from_utf8(&csv).unwrap();
     assert_eq!(text.lines().count(), 501);
-    assert!(text.starts_with(&COLUMNS.join(",")) && text.ends_with('\n') && !text.contains(['"', '\r']));
+    assert!(text.starts_with(&names()) && text.ends_with('\n') && !text.contains(['"', '\r']));
+    assert!(text.lines().skip(1).all(|line| line.ends_with(",partial,2,77,0123456789abcdef")));
     let mut reader = csv::Reader::from_reader(&csv[..]);
     assert_all_flies(reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()));
 }
 
 #[test]
 fn an_empty_csv_table_still_has_its_names() {
-    let csv = encode_csv(&Population { flies: vec![], ..population() }, &[]).unwrap();
-    assert_eq!(String::from_utf8(csv).unwrap(), format!("{}\n", COLUMNS.join(",")));
+    let csv = encode_csv(&Population { flies: vec![], ..population() }, &[], &meta()).unwrap();
+    assert_eq!(String::from_utf8(csv).unwrap(), format!("{}\n", names()));
 }
 
 #[test]
@@ -64,7 +75,10 @@ fn a_table_is_known_by_how_it_begins() {
     let workshop = Workshop::new();
     let meta = json!({"key": "k", "note": "line\nbreak"}).as_object().unwrap().clone();
     workshop.write("a.json", &encode_json(&population(), &fitness(), &meta).unwrap());
-    workshop.write("a.csv", &encode_csv(&population(), &fitness()).unwrap());
+    workshop.write("a.csv", &encode_csv(&population(), &fitness(), &self::meta()).unwrap());
+    let drawn = json!({"key": "ab".repeat(32)}).as_object().unwrap().clone();
+    workshop.write("drawn.csv", &encode_csv(&population(), &fitness(), &drawn).unwrap());
+    workshop.write("keyless.csv", &encode_csv(&population(), &fitness(), &Map::new()).unwrap());
     workshop
         .write("empty.json", &encode_json(&Population { flies: vec![], ..population() }, &[], &Map::new()).unwrap());
     workshop.write("other.json", b"{\"meta\": {\"key\": \"k\"}}");
@@ -74,6 +88,11 @@ fn a_table_is_known_by_how_it_begins() {
         assert_eq!(read_json_meta(&workshop.path(name)).unwrap(), None, "{name}");
     }
     assert!(read_json_meta(&workshop.path("missing.json")).is_err());
-    let tables = ["a.csv", "a.json", "photo.png", "missing.csv"].map(|name| is_csv_table(&workshop.path(name)));
-    assert_eq!(tables, [true, false, false, false]);
+    let told = |name| read_csv_meta(&workshop.path(name)).unwrap().map(Value::Object);
+    let of_a = json!({"key": "0123456789abcdef", "sae": 77, "restarts_made": 2, "status": "partial"});
+    assert_eq!(told("a.csv"), Some(of_a));
+    let of_drawn = json!({"key": "ab".repeat(8), "sae": null, "restarts_made": null, "status": ""});
+    assert_eq!(told("drawn.csv"), Some(of_drawn));
+    assert_eq!(["keyless.csv", "a.json", "photo.png"].map(told), [None, None, None]);
+    assert!(read_csv_meta(&workshop.path("missing.csv")).is_err());
 }
