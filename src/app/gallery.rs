@@ -10,18 +10,18 @@ use clap::Args;
 
 use super::cli::ProgressKind;
 use super::computing::ComputingArgs;
-use super::interrupt::Interrupt;
+use super::interrupt::SharedInterrupt;
 use super::look::{Dress, Look, LookArgs};
 use super::options::Verbosity;
 use super::progress::Progress;
 use super::sheet::sheet;
-use super::study::{Evolved, Recipe, Study};
+use super::study::{Made, Recipe, Study};
 use super::{report, values};
 use crate::error::{Error, Result};
 use crate::evolve::{ColorMode, ColorRule, PaperScheme};
 use crate::model::{Canvas, Target};
 use crate::output;
-use crate::photo::{self, Format, Metadata, Photo, ReadOptions};
+use crate::photo::{self, Format, Loaded, Metadata, Photo, ReadOptions};
 use crate::shapes::{BuiltIn, Shader};
 
 /// Longer side in px that pictures are evolved at, and cells are shown at.
@@ -80,20 +80,30 @@ pub(super) fn make(args: &GalleryArgs) -> ExitCode {
 }
 
 fn try_make(args: &GalleryArgs) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
+    let interrupt = SharedInterrupt::listen()?;
     let page = args.output.join("README.md");
     check_folder(&args.output, &page, args.force)?;
-    let targets = args.inputs.iter().map(|path| read(path)).collect::<Result<Vec<_>>>()?;
+    let verbosity = if args.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+    let targets = args.inputs.iter().map(|path| read(path, verbosity)).collect::<Result<Vec<_>>>()?;
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
     output::check_writable(&page)?;
-    let device = args.computing.begin(if args.quiet { Verbosity::Quiet } else { Verbosity::Normal })?;
+    let device = args.computing.begin(verbosity)?;
+    let write = |path: &Path, bytes: &[u8]| {
+        interrupt.check()?;
+        interrupt.while_writing(|| output::write_atomically(path, bytes))
+    };
+    // First, so that the folder is known for a gallery if this one is not finished.
+    write(&page, format!("{TITLE}\n\nNot finished; run the same command again.\n").as_bytes())?;
     let began = Instant::now();
     let study = Study::new(&device, &interrupt, Progress::new(args.progress.unless(args.quiet)));
-    let made = Shader::ALL.into_iter().try_for_each(|shader| make_sheet(args, &study, &targets, shader));
+    let made = Shader::ALL.into_iter().try_for_each(|shader| {
+        let bytes = make_sheet(args, &study, &targets, shader)?;
+        write(&args.output.join(file_of(shader)), &bytes)
+    });
     study.finish();
     made?;
-    output::write_atomically(&page, markdown(args).as_bytes())?;
+    write(&page, markdown(args).as_bytes())?;
     if !args.quiet {
         report::say(&format!("wrote {} in {:.1} s", page.display(), began.elapsed().as_secs_f64()));
     }
@@ -102,6 +112,9 @@ fn try_make(args: &GalleryArgs) -> Result<()> {
 
 /// Refuses a folder that holds anything but a gallery: its sheets have names that other pictures may have, too.
 fn check_folder(folder: &Path, page: &Path, force: bool) -> Result<()> {
+    if folder.is_file() {
+        return Err(Error::Usage(format!("{} is a file; name a folder", folder.display())));
+    }
     let is_gallery = std::fs::read(page).is_ok_and(|bytes| bytes.starts_with(TITLE.as_bytes()));
     let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
     if is_gallery || is_empty || force {
@@ -113,20 +126,24 @@ fn check_folder(folder: &Path, page: &Path, force: bool) -> Result<()> {
     )))
 }
 
-fn read(path: &Path) -> Result<Arc<Target>> {
+fn read(path: &Path, verbosity: Verbosity) -> Result<Arc<Target>> {
     let reading = ReadOptions { long_side_px: Some(SIDE_PX), ..ReadOptions::default() };
-    let Photo { width_px, height_px, pixels } = photo::read(path, &reading)?.photo;
+    let Loaded { photo, warnings, .. } = photo::read(path, &reading)?;
+    if verbosity > Verbosity::Quiet {
+        warnings.iter().for_each(|warning| report::error(&format!("{}: {warning}", path.display())));
+    }
+    let Photo { width_px, height_px, pixels } = photo;
     Target::new(width_px, height_px, pixels).map(Arc::new)
 }
 
-/// Evolves every mask under `shader` on all pictures, and writes the sheet: a row per picture, a column per mask.
-fn make_sheet(args: &GalleryArgs, study: &Study<'_>, targets: &[Arc<Target>], shader: Shader) -> Result<()> {
+/// Evolves every mask under `shader` on all pictures; the sheet has a row per picture and a column per mask.
+fn make_sheet(args: &GalleryArgs, study: &Study<'_>, targets: &[Arc<Target>], shader: Shader) -> Result<Vec<u8>> {
     let recipes = targets
         .iter()
         .flat_map(|target| BuiltIn::ALL.map(|shape| recipe(args, target, shape, shader)))
         .collect::<Result<Vec<Recipe>>>()?;
     let evolved = study.evolve(&recipes)?;
-    let draw = |(recipe, made): (&Recipe, &Evolved)| {
+    let draw = |(recipe, made): (&Recipe, &Made)| {
         let population = &made.population;
         let canvas = Canvas::scaled(population.width_px, population.height_px, SIDE_PX);
         study.draw(recipe, population, (&canvas, SUPERSAMPLING))
@@ -135,8 +152,7 @@ fn make_sheet(args: &GalleryArgs, study: &Study<'_>, targets: &[Arc<Target>], sh
     let rows: Vec<Vec<Option<&Photo>>> =
         photos.chunks(BuiltIn::ALL.len()).map(|row| row.iter().map(Some).collect()).collect();
     let jpeg = Format::Jpeg { quality: JPEG_QUALITY };
-    let bytes = photo::encode(jpeg, &sheet(&rows, SIDE_PX)?, &Metadata::new())?;
-    output::write_atomically(&args.output.join(file_of(shader)), &bytes)
+    photo::encode(jpeg, &sheet(&rows, SIDE_PX)?, &Metadata::new())
 }
 
 fn recipe(args: &GalleryArgs, target: &Arc<Target>, shape: BuiltIn, shader: Shader) -> Result<Recipe> {

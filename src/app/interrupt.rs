@@ -1,7 +1,7 @@
 //! Ctrl-C and its relatives: the first asks for an orderly end, a second Ctrl-C ends the process at once.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use signal_hook::consts::SIGINT;
 use signal_hook::low_level::unregister;
@@ -76,6 +76,37 @@ impl Interrupt {
             self.armed.store(true, Ordering::Relaxed);
         }
         written
+    }
+}
+
+/// An interrupt that several threads look at, and write under one after the other.
+#[derive(Debug)]
+pub(super) struct SharedInterrupt {
+    requested: Arc<AtomicBool>,
+    interrupt: Mutex<Interrupt>,
+}
+
+impl SharedInterrupt {
+    /// Listens to the signals from now on.
+    pub(super) fn listen() -> Result<Self> {
+        let interrupt = Interrupt::listen()?;
+        Ok(Self { requested: Arc::clone(&interrupt.requested), interrupt: Mutex::new(interrupt) })
+    }
+
+    /// Whether a signal came; waits for no writer.
+    pub(super) fn is_requested(&self) -> bool {
+        self.requested.load(Ordering::Relaxed)
+    }
+
+    /// # Errors
+    /// [`Error::Interrupted`] if a signal came.
+    pub(super) fn check(&self) -> Result<()> {
+        if self.is_requested() { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    /// As [`Interrupt::while_writing`].
+    pub(super) fn while_writing<T>(&self, write: impl FnOnce() -> T) -> T {
+        self.interrupt.lock().unwrap_or_else(PoisonError::into_inner).while_writing(write)
     }
 }
 

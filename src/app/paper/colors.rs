@@ -6,8 +6,9 @@ use super::gimp;
 use super::page::{Cell, Content, FigureTable, Page, PictureTable};
 use super::pictures::{photo_of, plain_grid};
 use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness};
+use crate::app::job::default_fly_count;
 use crate::app::presets::Preset;
-use crate::app::study::{Evolved, score};
+use crate::app::study::{Made, score};
 use crate::error::{Error, Result};
 use crate::evolve::ColorMode;
 use crate::metrics::edge_pixels;
@@ -23,9 +24,22 @@ struct Entry {
     /// The way, for people and for files.
     label: String,
     stem: String,
+    maker: Maker,
     /// One per picture; or why it is missing.
     photos: Vec<Result<Photo, String>>,
 }
+
+/// Whether the same command gives the same mosaic again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Maker {
+    Smalti,
+    /// It draws lots of its own.
+    Gimp,
+}
+
+/// What stands under GIMPressionist's figures.
+const ITS_OWN_LOTS: &str = "GIMPressionist draws lots of its own, so its figures differ a little from one time to the next; \
+                            all others on this page are the same every time.";
 
 /// Figure 6: where colours come from, and how edges are kept.
 pub(super) fn fig6(bench: &Workbench<'_>) -> Result<Page> {
@@ -49,8 +63,8 @@ pub(super) fn fig6(bench: &Workbench<'_>) -> Result<Page> {
     let mut entries: Vec<Entry> = (0..MODES.len())
         .map(|mode| entry_of(format!("colours {}", MODES[mode].0), MODES[mode].0, &evolved, mode, MODES.len()))
         .collect();
-    entries.push(grid_entry(&targets, recipes[0].fly_count));
-    entries.push(gimp_entry("square", &targets, recipes[0].fly_count, &Mask::square()));
+    entries.push(grid_entry(&targets));
+    entries.push(gimp_entry(bench, "square", &targets, &Mask::square())?);
 
     let mut page = Page::new(
         "Figure 6: colours evolved or picked, and edges",
@@ -58,10 +72,10 @@ pub(super) fn fig6(bench: &Workbench<'_>) -> Result<Page> {
          and that edges are kept better than by GIMPressionist. One run of scheme 3 each; the edges are Canny's, and \
          edge F1 says how well they are kept.",
     );
-    let (mosaics, table) = present(bench, "fig6", &targets, &entries)?;
+    let (mosaics, tables) = present(bench, "fig6", &targets, &entries)?;
     page.push("Mosaics", Content::Pictures(mosaics));
     page.push("Edges", Content::Pictures(edges(bench, &targets, &entries)?));
-    page.push("Likeness", Content::Figures(bench.write_table("fig6.csv", table)?));
+    push_likeness(bench, &mut page, "fig6", tables)?;
     Ok(page)
 }
 
@@ -82,45 +96,70 @@ pub(super) fn fig9(bench: &Workbench<'_>) -> Result<Page> {
     })?;
     let evolved = bench.study.evolve(&recipes)?;
     let targets: Vec<&Target> = recipes.iter().step_by(types.len()).map(|recipe| &*recipe.target).collect();
-    let fly_count = recipes[0].fly_count;
     let mut entries = Vec::new();
     for (number, (name, shape, shader, _)) in types.iter().enumerate() {
         entries.push(entry_of(format!("smalti, {name}"), name, &evolved, number, types.len()));
         let brush = shader.mask(&shape.template());
-        entries.push(gimp_entry(name, &targets, fly_count, &brush));
+        entries.push(gimp_entry(bench, name, &targets, &brush)?);
     }
-    entries.push(grid_entry(&targets, fly_count));
+    entries.push(grid_entry(&targets));
     let mut page = Page::new(
         "Figure 9: tile types beside GIMPressionist",
         "Mosaics, stripes, flowers and spray paint: two runs at 512 px each, beside GIMPressionist with a brush of the same \
          shape and as many strokes. The plain grid of mean colours is the least that a mosaic should beat.",
     );
-    let (mosaics, table) = present(bench, "fig9", &targets, &entries)?;
+    let (mosaics, tables) = present(bench, "fig9", &targets, &entries)?;
     page.push("Mosaics", Content::Pictures(mosaics));
-    page.push("Likeness", Content::Figures(bench.write_table("fig9.csv", table)?));
+    push_likeness(bench, &mut page, "fig9", tables)?;
     Ok(page)
 }
 
 /// The results of one of several ways, which take turns in `evolved`.
-fn entry_of(label: String, stem: &str, evolved: &[Evolved], way: usize, way_count: usize) -> Entry {
+fn entry_of(label: String, stem: &str, evolved: &[Made], way: usize, way_count: usize) -> Entry {
     let photos = evolved.iter().skip(way).step_by(way_count).map(|made| Ok(made.photo.clone())).collect();
-    Entry { label, stem: stem.to_owned(), photos }
+    Entry { label, stem: stem.to_owned(), maker: Maker::Smalti, photos }
 }
 
-fn grid_entry(targets: &[&Target], cell_count: usize) -> Entry {
-    let photos = targets.iter().map(|target| Ok(plain_grid(target, cell_count))).collect();
-    Entry { label: "plain grid of mean colours".to_owned(), stem: "grid".to_owned(), photos }
+fn grid_entry(targets: &[&Target]) -> Entry {
+    let grid = |target: &&Target| plain_grid(target, default_fly_count(target.width_px(), target.height_px()));
+    let photos = targets.iter().map(|target| Ok(grid(target))).collect();
+    Entry { label: "plain grid of mean colours".to_owned(), stem: "grid".to_owned(), maker: Maker::Smalti, photos }
 }
 
-fn gimp_entry(brush: &str, targets: &[&Target], stroke_count: usize, mask: &Mask) -> Entry {
-    let paint =
-        |target: &&Target| gimp::paint(&photo_of(target), stroke_count, mask).map_err(|error| error.to_string());
+/// What GIMPressionist paints with as many strokes as smalti would have tiles.
+fn gimp_entry(bench: &Workbench<'_>, brush: &str, targets: &[&Target], mask: &Mask) -> Result<Entry> {
+    let paint = |target: &&Target| {
+        let stroke_count = default_fly_count(target.width_px(), target.height_px());
+        gimp::paint(&photo_of(target), stroke_count, mask, bench.interrupt)
+    };
     let photos = if gimp::is_installed() {
         targets.par_iter().map(paint).collect()
     } else {
         vec![Err(NO_GIMP.to_owned()); targets.len()]
     };
-    Entry { label: format!("GIMPressionist, {brush} brush"), stem: format!("gimp-{brush}"), photos }
+    bench.interrupt.check()?;
+    let (label, stem) = (format!("GIMPressionist, {brush} brush"), format!("gimp-{brush}"));
+    Ok(Entry { label, stem, maker: Maker::Gimp, photos })
+}
+
+/// The likeness of what smalti made, and of what GIMPressionist did.
+struct Tables {
+    smalti: FigureTable,
+    gimp: FigureTable,
+}
+
+/// Adds the tables to the page, and writes those that say something.
+fn push_likeness(bench: &Workbench<'_>, page: &mut Page, figure: &str, tables: Tables) -> Result<()> {
+    let Tables { smalti, gimp } = tables;
+    page.push("Likeness", Content::Figures(bench.write_table(&format!("{figure}.csv"), smalti)?));
+    if !gimp.rows.is_empty() {
+        page.push(
+            "Likeness of GIMPressionist",
+            Content::Figures(bench.write_table(&format!("{figure}-gimp.csv"), gimp)?),
+        );
+        page.push("Note", Content::Text(vec![ITS_OWN_LOTS.to_owned()]));
+    }
+    Ok(())
 }
 
 /// Writes the pictures of all entries; returns them in rows under their originals, and their likeness.
@@ -129,7 +168,7 @@ fn present(
     figure: &str,
     targets: &[&Target],
     entries: &[Entry],
-) -> Result<(PictureTable, FigureTable)> {
+) -> Result<(PictureTable, Tables)> {
     let names = bench.picture_names();
     let mut originals = Vec::new();
     for (target, name) in targets.iter().zip(&names) {
@@ -139,7 +178,9 @@ fn present(
     let mut rows = vec![("original".to_owned(), originals)];
     let mut table = FigureTable { head: heads(&["made by", "picture"]), ..FigureTable::default() };
     table.head.extend(heads(&LIKENESS));
-    for Entry { label, stem, photos } in entries {
+    let mut tables = Tables { smalti: table.clone(), gimp: table };
+    for Entry { label, stem, maker, photos } in entries {
+        let table = if *maker == Maker::Gimp { &mut tables.gimp } else { &mut tables.smalti };
         let mut cells = Vec::new();
         for ((photo, target), name) in photos.iter().zip(targets).zip(&names) {
             let photo = match photo {
@@ -157,7 +198,7 @@ fn present(
         }
         rows.push((label.clone(), cells));
     }
-    Ok((PictureTable { head: names, rows }, table))
+    Ok((PictureTable { head: names, rows }, tables))
 }
 
 /// The edges of the originals and of all entries.
@@ -174,7 +215,7 @@ fn edges(bench: &Workbench<'_>, targets: &[&Target], entries: &[Entry]) -> Resul
     };
     let originals: Vec<Photo> = targets.iter().map(|target| photo_of(target)).collect();
     let mut rows = vec![row("original", "original", &originals.iter().map(Some).collect::<Vec<_>>())?];
-    for Entry { label, stem, photos } in entries {
+    for Entry { label, stem, photos, .. } in entries {
         rows.push(row(label, stem, &photos.iter().map(|photo| photo.as_ref().ok()).collect::<Vec<_>>())?);
     }
     Ok(PictureTable { head: names, rows })

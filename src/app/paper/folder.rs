@@ -4,6 +4,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::page::{GENERATOR, Page};
+use crate::app::interrupt::SharedInterrupt;
 use crate::app::options::Overwrite;
 use crate::error::{Error, Result};
 use crate::output;
@@ -13,18 +14,23 @@ use crate::photo::{self, Metadata, Photo};
 const HEAD_BYTES: u64 = 512;
 
 /// A folder that holds nothing but pages of ours and what belongs to them.
-#[derive(Clone, Debug)]
-pub(super) struct Folder {
+#[derive(Debug)]
+pub(super) struct Folder<'a> {
     root: PathBuf,
     metadata: Metadata,
+    interrupt: &'a SharedInterrupt,
 }
 
-impl Folder {
+impl<'a> Folder<'a> {
     /// The folder at `root`, created if it is missing. Pictures in it tell `software` in their metadata.
     ///
     /// # Errors
-    /// [`Error::Usage`] if it holds other files and may not be written over; [`Error::Output`] if it cannot be created.
-    pub(super) fn open(root: &Path, overwrite: Overwrite) -> Result<Self> {
+    /// [`Error::Usage`] if it is a file, or holds other files and may not be written over; [`Error::Output`] if it cannot
+    /// be created.
+    pub(super) fn open(root: &Path, overwrite: Overwrite, interrupt: &'a SharedInterrupt) -> Result<Self> {
+        if root.is_file() {
+            return Err(Error::Usage(format!("{} is a file; name a folder", root.display())));
+        }
         if overwrite == Overwrite::Refuse && root.is_dir() && !is_empty_or_ours(root)? {
             return Err(Error::Usage(format!(
                 "{} holds files that smalti paper did not write; name another folder, or add to it with --force",
@@ -34,16 +40,20 @@ impl Folder {
         create(root, root)?;
         output::check_writable(&root.join("index.html"))?;
         let software = format!("smalti {}", env!("CARGO_PKG_VERSION"));
-        Ok(Self { root: root.to_owned(), metadata: vec![("Software".to_owned(), software)] })
+        Ok(Self { root: root.to_owned(), metadata: vec![("Software".to_owned(), software)], interrupt })
     }
 
     /// Writes a file; `name` is its path in the folder.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] if somebody asked for the end; [`Error::Output`] if it cannot be written.
     pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        self.interrupt.check()?;
         let path = self.root.join(name);
         if let Some(parent) = path.parent() {
             create(parent, &path)?;
         }
-        output::write_atomically(&path, bytes)
+        self.interrupt.while_writing(|| output::write_atomically(&path, bytes))
     }
 
     /// Writes a picture as PNG.

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::error::{Error, Result};
+use crate::app::interrupt::SharedInterrupt;
 use crate::model::mask::{MASK_SIDE, Mask};
 use crate::photo::{self, Photo, ReadOptions};
 
@@ -35,12 +35,17 @@ pub(super) fn is_installed() -> bool {
 /// served the square brush best at 500 to 2,500 strokes.
 ///
 /// # Errors
-/// [`Error::Internal`] with what GIMP did if no picture comes out.
-pub(super) fn paint(picture: &Photo, stroke_count: usize, mask: &Mask) -> Result<Photo> {
+/// A sentence for the page if no picture comes out, be it that somebody asked for the end.
+pub(super) fn paint(
+    picture: &Photo,
+    stroke_count: usize,
+    mask: &Mask,
+    interrupt: &SharedInterrupt,
+) -> Result<Photo, String> {
     let folder = tempfile::tempdir().map_err(|error| failed(&format!("no temporary folder: {error}")))?;
     let files = Files { folder: folder.path() };
     files.prepare(picture, stroke_count, mask)?;
-    files.run()?;
+    files.run(interrupt)?;
     let painted = photo::read(&files.folder.join("out.png"), &ReadOptions::default())
         .map_err(|_| failed("it wrote no picture"))?
         .photo;
@@ -50,8 +55,20 @@ pub(super) fn paint(picture: &Photo, stroke_count: usize, mask: &Mask) -> Result
     Ok(painted)
 }
 
-fn failed(what: &str) -> Error {
-    Error::Internal(format!("GIMP did not paint: {what}"))
+fn failed(what: &str) -> String {
+    format!("GIMP did not paint: {what}")
+}
+
+/// Ctrl-C of a terminal goes to all processes of a group; this one is ended by us.
+#[cfg(unix)]
+fn in_its_own_group(command: &mut Command) -> &mut Command {
+    use std::os::unix::process::CommandExt;
+    command.process_group(0)
+}
+
+#[cfg(not(unix))]
+fn in_its_own_group(command: &mut Command) -> &mut Command {
+    command
 }
 
 /// GIMP's folder, the picture and the result.
@@ -60,11 +77,11 @@ struct Files<'a> {
 }
 
 impl Files<'_> {
-    fn prepare(&self, picture: &Photo, stroke_count: usize, mask: &Mask) -> Result<()> {
+    fn prepare(&self, picture: &Photo, stroke_count: usize, mask: &Mask) -> Result<(), String> {
         let side = f64::from(picture.width_px) * f64::from(picture.height_px) / stroke_count as f64;
         let settings = settings(side.sqrt());
         let files: [(&str, Vec<u8>); 4] = [
-            ("in.png", photo::encode_png(picture, &photo::Metadata::new())?),
+            ("in.png", photo::encode_png(picture, &photo::Metadata::new()).map_err(|error| error.to_string())?),
             ("scripts/smalti.scm", SCRIPT.as_bytes().to_vec()),
             ("gimpressionist/Presets/smalti", settings.into_bytes()),
             ("gimpressionist/Brushes/smalti.pgm", brush(mask)),
@@ -79,28 +96,34 @@ impl Files<'_> {
         Ok(())
     }
 
-    fn run(&self) -> Result<()> {
+    fn run(&self, interrupt: &SharedInterrupt) -> Result<(), String> {
         let call = r#"(smalti-paint "in.png" "out.png" "smalti")"#;
-        let mut gimp = Command::new(PROGRAM)
+        let mut command = Command::new(PROGRAM);
+        command
             .args(["-i", "-d", "-f", "-b", call, "-b", "(gimp-quit 0)"])
             .current_dir(self.folder)
             .env("GIMP2_DIRECTORY", self.folder)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .map_err(|error| failed(&format!("it does not start ({error})")))?;
+            .stderr(Stdio::null());
+        let mut gimp =
+            in_its_own_group(&mut command).spawn().map_err(|error| failed(&format!("it does not start ({error})")))?;
         let began = Instant::now();
         loop {
             match gimp.try_wait() {
                 Ok(Some(_)) => return Ok(()),
-                Ok(None) if began.elapsed() < TIME_LIMIT => std::thread::sleep(Duration::from_millis(50)),
+                Ok(None) if began.elapsed() < TIME_LIMIT && !interrupt.is_requested() => {
+                    std::thread::sleep(Duration::from_millis(50))
+                }
                 outcome => {
                     // It is given up; whether it could be ended changes nothing.
                     let _ = gimp.kill();
                     let _ = gimp.wait();
-                    let why =
-                        outcome.err().map_or("it took more than three minutes".to_owned(), |error| error.to_string());
+                    let why = match outcome {
+                        Err(error) => error.to_string(),
+                        _ if interrupt.is_requested() => "it was interrupted".to_owned(),
+                        _ => "it took more than three minutes".to_owned(),
+                    };
                     return Err(failed(&why));
                 }
             }

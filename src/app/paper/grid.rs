@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use super::page::{Cell, Content, FigureTable, Page, PictureTable};
-use super::pictures::{photo_of, plain_grid};
-use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness, spread};
+use super::pictures::{Picture, photo_of, plain_grid};
+use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness, spread_told};
 use crate::app::job::default_fly_count;
 use crate::app::presets::{Preset, Shaders};
-use crate::app::study::{Evolved, score};
+use crate::app::study::{Made, score};
 use crate::error::Result;
 use crate::metrics::Score;
 use crate::model::Canvas;
@@ -55,7 +55,9 @@ pub(super) fn fig4(bench: &Workbench<'_>) -> Result<Page> {
         presets.iter().map(|preset| bench.recipe(picture, *preset, &Tiles::default())).collect()
     })?;
     let evolved = bench.study.evolve(&recipes)?;
-    let row = |scheme: usize| (0..bench.pictures.len()).map(move |picture| picture * presets_count() + scheme);
+    let scores = bench.study.scores(&recipes, &evolved)?;
+    let scheme_count = presets.len();
+    let row = |scheme: usize| (0..bench.pictures.len()).map(move |picture| picture * scheme_count + scheme);
 
     let originals = bench.pictures.iter().map(|picture| picture.target(SHEET_CELL_PX, None).map(|t| photo_of(&t)));
     let originals: Vec<Photo> = originals.collect::<Result<_>>()?;
@@ -75,9 +77,8 @@ pub(super) fn fig4(bench: &Workbench<'_>) -> Result<Page> {
 
     let mut rows = vec![("original".to_owned(), names.iter().map(|name| original_cell("fig4", name)).collect())];
     for (scheme, preset) in presets.iter().enumerate() {
-        let cells = row(scheme)
-            .zip(&names)
-            .map(|(k, name)| cell(&format!("fig4/{}/{name}.png", preset.name()), &evolved[k].score));
+        let cells =
+            row(scheme).zip(&names).map(|(k, name)| cell(&format!("fig4/{}/{name}.png", preset.name()), &scores[k]));
         rows.push((describe(*preset), cells.collect()));
     }
     let mut sheet_rows = vec![originals.iter().map(Some).collect::<Vec<_>>()];
@@ -87,17 +88,37 @@ pub(super) fn fig4(bench: &Workbench<'_>) -> Result<Page> {
     let mut page = Page::new(
         "Figure 4: the 12 schemes",
         "Each column is a picture, each row a scheme of Table 1; row 0 has the originals. The figures are against the picture \
-         as it was evolved towards.",
+         that was evolved towards, which stands under Targets.",
     );
     page.push("Mosaics", Content::Pictures(PictureTable { head: names, rows }));
-    let table = fig4_figures(bench, &presets, &evolved)?;
+    page.push("Targets", Content::Pictures(targets(bench, &presets[..TARGET_KINDS])?));
+    let table = fig4_figures(bench, &presets, &evolved, &scores)?;
     page.push("Likeness", Content::Figures(bench.write_table("fig4.csv", table)?));
     Ok(page)
 }
 
-/// Number of the paper's schemes.
-fn presets_count() -> usize {
-    Preset::all().count()
+/// Schemes 1 to 4 have every size with every number of colours.
+const TARGET_KINDS: usize = 4;
+
+/// The file of what `preset` evolves the picture `name` towards.
+fn target_file(preset: Preset, name: &str) -> String {
+    let colors = preset.color_count.map(|count| format!("-{count}")).unwrap_or_default();
+    format!("fig4/target-{}{colors}/{name}.png", preset.side_px)
+}
+
+/// Writes what the presets evolve towards; returns it in a row per preset.
+fn targets(bench: &Workbench<'_>, presets: &[Preset]) -> Result<PictureTable> {
+    let row = |&preset: &Preset| -> Result<(String, Vec<Cell>)> {
+        let cell = |picture: &Picture| {
+            let file = target_file(preset, &picture.name);
+            let target = picture.target(preset.side_px, preset.color_count)?;
+            bench.folder.write_picture(&file, &photo_of(&target))?;
+            Ok(Cell::Picture { file, caption: picture.name.clone() })
+        };
+        let cells = bench.pictures.iter().map(cell).collect::<Result<_>>()?;
+        Ok((format!("{} px, {}", preset.side_px, colors_told(preset)), cells))
+    };
+    Ok(PictureTable { head: bench.picture_names(), rows: presets.iter().map(row).collect::<Result<_>>()? })
 }
 
 /// The cell of an original.
@@ -106,7 +127,7 @@ pub(super) fn original_cell(figure: &str, name: &str) -> Cell {
 }
 
 fn describe(preset: Preset) -> String {
-    let colors = preset.color_count.map_or("full colour".to_owned(), |count| format!("{count} colours"));
+    let colors = colors_told(preset);
     let shaders = match preset.shaders {
         Shaders::One => "one shader",
         Shaders::Two => "two shaders",
@@ -115,30 +136,38 @@ fn describe(preset: Preset) -> String {
     format!("{}: {} px, {colors}, {shaders}", preset.name(), preset.side_px)
 }
 
+fn colors_told(preset: Preset) -> String {
+    preset.color_count.map_or("full colour".to_owned(), |count| format!("{count} colours"))
+}
+
 /// Per scheme and picture the likeness, and that of the plainest mosaic with as many tiles.
-fn fig4_figures(bench: &Workbench<'_>, presets: &[Preset], evolved: &[Evolved]) -> Result<FigureTable> {
+fn fig4_figures(bench: &Workbench<'_>, presets: &[Preset], evolved: &[Made], scores: &[Score]) -> Result<FigureTable> {
     let mut table = FigureTable { head: heads(&["scheme", "picture"]), ..FigureTable::default() };
     table.head.extend(heads(&LIKENESS));
-    table.head.extend(heads(&["SAE to the full-colour picture", "births", "Clark-Evans index"]));
-    for (k, evolved) in evolved.iter().enumerate() {
+    table.head.extend(heads(&["SAE to the full-colour picture", "births", "Clark-Evans index", "target"]));
+    for (k, (evolved, likeness_of)) in evolved.iter().zip(scores).enumerate() {
         let (picture, preset) = (&bench.pictures[k / presets.len()], presets[k % presets.len()]);
         let full = picture.target(preset.side_px, None)?;
-        let to_full = if preset.color_count.is_some() { score(&full, &evolved.photo)? } else { evolved.score };
+        let to_full = if preset.color_count.is_some() { score(&full, &evolved.photo)? } else { *likeness_of };
         let mut row = vec![preset.name(), picture.name.clone()];
-        row.extend(likeness(&evolved.score));
-        row.extend([to_full.difference.sae().to_string(), evolved.births.to_string(), spread(evolved)]);
+        row.extend(likeness(likeness_of));
+        row.extend([to_full.difference.sae().to_string(), evolved.births.to_string(), spread_told(&evolved.spread)]);
+        row.push(target_file(preset, &picture.name));
         table.rows.push(row);
     }
-    let grids: Vec<(u32, usize)> =
-        [256, 512].iter().flat_map(|&px| (0..bench.pictures.len()).map(move |p| (px, p))).collect();
+    let sizes = [Preset::paper(1), Preset::paper(3)];
+    let grids: Vec<(Preset, &Picture)> =
+        sizes.iter().flat_map(|&preset| bench.pictures.iter().map(move |picture| (preset, picture))).collect();
     let rows: Vec<Result<Vec<String>>> = grids
         .par_iter()
-        .map(|&(side_px, picture)| {
-            let picture = &bench.pictures[picture];
+        .map(|&(preset, picture)| {
+            bench.interrupt.check()?;
+            let side_px = preset.side_px;
             let (cell_count, score) = grid_score(picture, side_px)?;
             let mut row = vec![format!("plain grid of {cell_count}, {side_px} px"), picture.name.clone()];
             row.extend(likeness(&score));
             row.extend([score.difference.sae().to_string(), "0".to_owned(), "none".to_owned()]);
+            row.push(target_file(preset, &picture.name));
             Ok(row)
         })
         .collect();
@@ -149,7 +178,7 @@ fn fig4_figures(bench: &Workbench<'_>, presets: &[Preset], evolved: &[Evolved]) 
 }
 
 /// Likeness of the plain grid with as many cells as the preset of that size has flies.
-fn grid_score(picture: &super::pictures::Picture, side_px: u32) -> Result<(usize, Score)> {
+fn grid_score(picture: &Picture, side_px: u32) -> Result<(usize, Score)> {
     let target = picture.target(side_px, None)?;
     let fly_count = default_fly_count(target.width_px(), target.height_px());
     Ok((fly_count, score(&target, &plain_grid(&target, fly_count))?))

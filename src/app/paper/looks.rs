@@ -69,60 +69,61 @@ fn sample(mask: &Mask) -> Photo {
 }
 
 /// A row of figure 8: what it is called, and how it changes the recipe.
-struct Look {
+struct Variant {
     label: &'static str,
     tiles: Tiles,
     change: fn(&mut Recipe),
 }
 
 /// The rows of figure 8.
-fn looks() -> [Look; 6] {
+fn variants() -> [Variant; 6] {
     let tiles = |mask, shader| Tiles { mask: Some(mask), shader: Some(shader), opacity: None };
     let same: fn(&mut Recipe) = |_| {};
     [
-        Look { label: "8a: flower, its own shading", tiles: tiles("flower", Shader::Template), change: same },
-        Look { label: "8b: the same mask embossed", tiles: tiles("flower", Shader::Emboss), change: same },
-        Look {
+        Variant { label: "8a: flower, its own shading", tiles: tiles("flower", Shader::Template), change: same },
+        Variant { label: "8b: the same mask embossed", tiles: tiles("flower", Shader::Emboss), change: same },
+        Variant {
             label: "8c: four times the sides of Eq. 1",
             tiles: tiles("flower", Shader::Template),
             change: |recipe| recipe.scheme.tile_scale_q16 = 4 << 16,
         },
-        Look {
+        Variant {
             label: "8d: rotation ignored",
             tiles: tiles("square", Shader::Template),
             change: |recipe| recipe.scheme.rotation = Rotation::None,
         },
-        Look { label: "8e: square with an edge", tiles: tiles("border", Shader::Template), change: same },
-        Look { label: "8f: hexagon with an outline", tiles: tiles("hexagon", Shader::Outline), change: same },
+        Variant { label: "8e: square with an edge", tiles: tiles("border", Shader::Template), change: same },
+        Variant { label: "8f: hexagon with an outline", tiles: tiles("hexagon", Shader::Outline), change: same },
     ]
 }
 
 /// Figure 8: looks.
 pub(super) fn fig8(bench: &Workbench<'_>) -> Result<Page> {
-    let looks = looks();
+    let variants = variants();
     let preset = Preset::paper(7);
     let recipes = bench.recipes_of_all(|picture| {
-        let recipe = |look: &Look| {
-            let mut recipe = bench.recipe(picture, preset, &look.tiles)?;
-            (look.change)(&mut recipe);
+        let recipe = |variant: &Variant| {
+            let mut recipe = bench.recipe(picture, preset, &variant.tiles)?;
+            (variant.change)(&mut recipe);
             Ok(recipe)
         };
-        looks.iter().map(recipe).collect()
+        variants.iter().map(recipe).collect()
     })?;
     let evolved = bench.study.evolve(&recipes)?;
+    let scores = bench.study.scores(&recipes, &evolved)?;
     let mut rows = Vec::new();
     let mut table = FigureTable { head: heads(&["look", "picture"]), ..FigureTable::default() };
     table.head.extend(heads(&LIKENESS));
-    for (number, look) in looks.iter().enumerate() {
+    for (number, variant) in variants.iter().enumerate() {
         let mut cells = Vec::new();
         for (place, picture) in bench.pictures.iter().enumerate() {
-            let made = &evolved[place * looks.len() + number];
-            let file = format!("fig8/{}-{}.png", &look.label[..2], picture.name);
+            let (made, score) = (&evolved[place * variants.len() + number], &scores[place * variants.len() + number]);
+            let file = format!("fig8/{}-{}.png", &variant.label[..2], picture.name);
             bench.folder.write_picture(&file, &made.photo)?;
-            cells.push(cell(&file, &made.score));
-            table.rows.push([vec![look.label.to_owned(), picture.name.clone()], likeness(&made.score)].concat());
+            cells.push(cell(&file, score));
+            table.rows.push([vec![variant.label.to_owned(), picture.name.clone()], likeness(score)].concat());
         }
-        rows.push((look.label.to_owned(), cells));
+        rows.push((variant.label.to_owned(), cells));
     }
     let mut page = Page::new(
         "Figure 8: looks",

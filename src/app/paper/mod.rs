@@ -22,7 +22,7 @@ use clap::{Args, ValueEnum};
 
 use super::cli::ProgressKind;
 use super::computing::ComputingArgs;
-use super::interrupt::Interrupt;
+use super::interrupt::SharedInterrupt;
 use super::options::{Overwrite, Verbosity};
 use super::progress::Progress;
 use super::study::Study;
@@ -132,37 +132,48 @@ pub(super) fn make(args: &PaperArgs) -> ExitCode {
 }
 
 fn try_make(args: &PaperArgs) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
+    let interrupt = SharedInterrupt::listen()?;
+    let verbosity = if args.quiet { Verbosity::Quiet } else { Verbosity::Normal };
     let images = match &args.images {
         None if args.name.needs_pictures() => {
             return Err(Error::Usage("this figure needs pictures; name their folder with --images".to_owned()));
         }
-        Some(folder) if args.name.needs_pictures() => pictures::in_folder(folder, workbench::SIDE_MAX_PX)?,
+        Some(folder) if args.name.needs_pictures() => pictures::in_folder(folder, verbosity)?,
         _ => Vec::new(),
     };
     let overwrite = if args.force { Overwrite::Force } else { Overwrite::Refuse };
-    let folder = Folder::open(&args.output, overwrite)?;
-    let device = args.computing.begin(if args.quiet { Verbosity::Quiet } else { Verbosity::Normal })?;
+    let folder = Folder::open(&args.output, overwrite, &interrupt)?;
+    let device = args.computing.begin(verbosity)?;
     let progress = Progress::new(args.progress.unless(args.quiet));
     let began = Instant::now();
     let study = Study::new(&device, &interrupt, progress);
-    let bench = Workbench { study: &study, pictures: images, folder, births: args.births, seed: args.seed };
+    let bench = Workbench {
+        study: &study,
+        pictures: images,
+        folder,
+        interrupt: &interrupt,
+        births: args.births,
+        seed: args.seed,
+    };
     let made = write_page(&bench, args.name);
     study.finish();
-    let path = made?;
+    let path = bench.folder.path(&made?.0);
     if !args.quiet {
         report::say(&format!("wrote {} in {:.1} s", path.display(), began.elapsed().as_secs_f64()));
     }
     Ok(())
 }
 
-/// Makes a page and writes it; returns its path.
-fn write_page(bench: &Workbench<'_>, name: Name) -> Result<PathBuf> {
-    let page = name.make(bench)?;
+/// Makes a page and writes it; returns its file and its title. Until it is made, a page that says so stands in its place,
+/// which also tells that the folder is ours.
+fn write_page(bench: &Workbench<'_>, name: Name) -> Result<(String, String)> {
     let word = if name == Name::All { "index".to_owned() } else { name.word() };
     let command = format!("smalti paper {} --births {} --seed {}", name.word(), bench.births, bench.seed);
+    let unfinished = Page::new(&word, "Not finished: this page was being made. Run the same command again.");
+    bench.folder.write_page(&word, &unfinished, &command)?;
+    let page = name.make(bench)?;
     bench.folder.write_page(&word, &page, &command)?;
-    Ok(bench.folder.path(&format!("{word}.html")))
+    Ok((format!("{word}.html"), page.title))
 }
 
 /// All pages, and one that leads to them.
@@ -171,14 +182,8 @@ fn all(bench: &Workbench<'_>) -> Result<Page> {
         "Evolutionary Art using the Fly Algorithm, reproduced",
         "Every table and figure of the paper that shows a result. Figures 1 and 2 are diagrams; they are in the documentation.",
     );
-    let mut links = Vec::new();
-    for name in Name::value_variants().iter().copied().filter(|name| *name != Name::All) {
-        let page = name.make(bench)?;
-        let file = format!("{}.html", name.word());
-        let command = format!("smalti paper {} --births {} --seed {}", name.word(), bench.births, bench.seed);
-        bench.folder.write_page(&name.word(), &page, &command)?;
-        links.push((file, page.title));
-    }
+    let names = Name::value_variants().iter().copied().filter(|name| *name != Name::All);
+    let links = names.map(|name| write_page(bench, name)).collect::<Result<_>>()?;
     index.push("Pages", Content::Links(links));
     Ok(index)
 }

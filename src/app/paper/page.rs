@@ -129,13 +129,22 @@ impl Page {
     }
 }
 
+/// The path of a file in the folder as a URL: what is no letter, digit or one of `-._~/` is percent-encoded.
+fn url(path: &str) -> String {
+    let encode = |byte: u8| match byte {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => char::from(byte).to_string(),
+        _ => format!("%{byte:02X}"),
+    };
+    path.bytes().map(encode).collect()
+}
+
 fn content(content: &Content) -> Markup {
     match content {
         Content::Text(paragraphs) => html! { @for paragraph in paragraphs { p { (paragraph) } } },
         Content::Pictures(table) => pictures(table),
         Content::Figures(table) => figures(table),
         Content::Plot(svg) => html! { div { (PreEscaped(svg)) } },
-        Content::Links(links) => html! { ul { @for (file, text) in links { li { a href=(file) { (text) } } } } },
+        Content::Links(links) => html! { ul { @for (file, text) in links { li { a href=(url(file)) { (text) } } } } },
     }
 }
 
@@ -152,7 +161,7 @@ fn pictures(table: &PictureTable) -> Markup {
                         td {
                             @match cell {
                                 Cell::Picture { file, caption } => {
-                                    a href=(file) { img src=(file) alt=(format!("{head}: {caption}")) loading="lazy"; }
+                                    a href=(url(file)) { img src=(url(file)) alt=(format!("{head}: {caption}")) loading="lazy"; }
                                     (caption)
                                 }
                                 Cell::Missing(why) => (why),
@@ -171,13 +180,19 @@ fn figures(table: &FigureTable) -> Markup {
             tr { @for head in &table.head { th { (head) } } }
             @for row in &table.rows { tr { @for value in row { td { (value) } } } }
         } }
-        @if let Some(file) = &table.file { p { a href=(file) { (file) } } }
+        @if let Some(file) = &table.file { p { a href=(url(file)) { (file) } } }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn addresses_mean_the_files_that_they_name() {
+        assert_eq!(url("fig4/we ird#1?50%\u{e9}.png"), "fig4/we%20ird%231%3F50%25%C3%A9.png");
+        assert_eq!(url("fig4/paper-1/a_b.c~.png"), "fig4/paper-1/a_b.c~.png");
+    }
 
     #[test]
     fn what_people_name_their_files_cannot_break_a_page_or_a_table() {

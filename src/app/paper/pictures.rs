@@ -1,28 +1,37 @@
 //! The pictures of a figure, and what other tools would make of them.
 
 use std::ffi::OsStr;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::app::options::Verbosity;
+use crate::app::report;
 use crate::error::{Error, Result};
+use crate::metrics;
 use crate::model::Target;
-use crate::photo::{self, Photo, ReadOptions};
+use crate::photo::{self, Loaded, Photo, ReadOptions};
 
 /// Endings of the files that are taken for pictures.
 const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif"];
+
+/// Longer sides in px that the paper evolves pictures at.
+pub(super) const SIDES_PX: [u32; 2] = [256, 512];
 
 /// A picture with its name.
 #[derive(Clone, Debug)]
 pub(super) struct Picture {
     /// The file's name without its ending.
     pub name: String,
-    photo: Photo,
+    /// Reduced to each of [`SIDES_PX`].
+    photos: [Photo; SIDES_PX.len()],
 }
 
 impl Picture {
-    /// The picture as evolutions aim at it: reduced to `side_px` and to `color_count` colours.
+    /// The picture as evolutions aim at it: reduced to `side_px`, one of [`SIDES_PX`], and to `color_count` colours.
     pub(super) fn target(&self, side_px: u32, color_count: Option<usize>) -> Result<Arc<Target>> {
-        let mut photo = photo::fitted(&self.photo, side_px);
+        let index = SIDES_PX.iter().position(|&px| px == side_px);
+        let index = index.ok_or_else(|| Error::Internal(format!("no picture is kept at {side_px} px")))?;
+        let mut photo = self.photos[index].clone();
         if let Some(count) = color_count {
             let palette = photo::palette_of(&photo, count)?;
             photo::reduce(&mut photo, &palette);
@@ -34,8 +43,9 @@ impl Picture {
 /// The pictures in `folder`, by name; files that do not end like pictures are passed over.
 ///
 /// # Errors
-/// [`Error::Input`] if the folder or a picture cannot be read, or if there is none.
-pub(super) fn in_folder(folder: &Path, long_side_px: u32) -> Result<Vec<Picture>> {
+/// [`Error::Input`] if the folder or a picture cannot be read, if there is none, or if one is too narrow to be scored;
+/// [`Error::Usage`] if two have the same name but for their endings.
+pub(super) fn in_folder(folder: &Path, verbosity: Verbosity) -> Result<Vec<Picture>> {
     let unreadable = |error: std::io::Error| Error::input(folder, photo::why_unreadable(&error));
     let mut paths = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
@@ -49,12 +59,47 @@ pub(super) fn in_folder(folder: &Path, long_side_px: u32) -> Result<Vec<Picture>
         return Err(Error::input(folder, "has no pictures in it; name a folder with PNG or JPEG files"));
     }
     paths.sort();
-    let reading = ReadOptions { long_side_px: Some(long_side_px), ..ReadOptions::default() };
-    let read = |path: &std::path::PathBuf| {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        Ok(Picture { name, photo: photo::read(path, &reading)?.photo })
-    };
-    paths.iter().map(read).collect()
+    let pictures = paths.iter().map(|path| read(path, verbosity)).collect::<Result<Vec<_>>>()?;
+    check_names(&paths, &pictures)?;
+    Ok(pictures)
+}
+
+/// Refuses pictures whose results would have the same name, even where letters may be large or small.
+fn check_names(paths: &[PathBuf], pictures: &[Picture]) -> Result<()> {
+    for (later, picture) in pictures.iter().enumerate() {
+        let is_same = |other: &Picture| other.name.to_lowercase() == picture.name.to_lowercase();
+        if let Some(earlier) = pictures[..later].iter().position(is_same) {
+            return Err(Error::Usage(format!(
+                "{} and {} would write the same files; rename one of them",
+                paths[earlier].display(),
+                paths[later].display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The picture at `path` at every size, each reduced from the original; what was ignored in it is told.
+fn read(path: &Path, verbosity: Verbosity) -> Result<Picture> {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let Loaded { photo, warnings, .. } = photo::read(path, &ReadOptions::default())?;
+    if verbosity > Verbosity::Quiet {
+        warnings.iter().for_each(|warning| report::error(&format!("{}: {warning}", path.display())));
+    }
+    let photos = SIDES_PX.map(|side_px| photo::fitted(&photo, side_px));
+    for (Photo { width_px, height_px, .. }, side_px) in photos.iter().zip(SIDES_PX) {
+        if *width_px.min(height_px) < metrics::SIDE_MIN_PX {
+            let least = metrics::SIDE_MIN_PX;
+            return Err(Error::input(
+                path,
+                format!(
+                    "has {width_px}x{height_px} px when its longer side is at most {side_px} px, fewer than the {least}x{least} that a score needs; \
+                     use a larger or less narrow one"
+                ),
+            ));
+        }
+    }
+    Ok(Picture { name, photos })
 }
 
 /// A target as a picture.

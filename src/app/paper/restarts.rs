@@ -1,10 +1,14 @@
 //! Figure 5: restarts, and the curve of global fitness.
 
 use super::page::{Cell, Content, FigureTable, Page, PictureTable};
-use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness, spread};
+use super::workbench::{LIKENESS, Tiles, Workbench, cell, heads, likeness, spread_told};
 use crate::app::presets::Preset;
-use crate::app::study::{Evolved, Recipe};
+use crate::app::study::{Made, Recipe, score};
 use crate::error::Result;
+use crate::evolve::Spread;
+use crate::metrics::Score;
+use crate::model::{Canvas, Population};
+use crate::photo::Photo;
 use crate::plot::{Mark, Plot, Scale, Series};
 
 /// Runs after the first.
@@ -15,25 +19,19 @@ const COOLINGS: [(&str, &str, u32); 2] =
 
 /// Figure 5: what restarts do.
 pub(super) fn fig5(bench: &Workbench<'_>) -> Result<Page> {
-    // The best population after run r is the result of an evolution with r restarts: runs do not know how many follow.
     let recipes = bench.recipes_of_all(|picture| {
         let plain = bench.recipe(picture, Preset::paper(1), &Tiles::default())?;
-        let restarted = |cool_q16: u32, restarts: u32| {
+        let restarted = |cool_q16: u32| {
             let mut recipe: Recipe = plain.clone();
-            recipe.scheme.restarts = restarts;
+            recipe.scheme.restarts = RESTARTS;
             recipe.scheme.cool_q16 = cool_q16;
             recipe
         };
-        Ok(COOLINGS
-            .iter()
-            .flat_map(|&(_, _, cool)| (0..=RESTARTS).map(move |r| (cool, r)))
-            .map(|(c, r)| restarted(c, r))
-            .collect())
+        Ok(COOLINGS.iter().map(|&(_, _, cool_q16)| restarted(cool_q16)).collect())
     })?;
     let evolved = bench.study.evolve(&recipes)?;
-    let of = |picture: usize, cooling: usize, run: u32| {
-        &evolved[(picture * COOLINGS.len() + cooling) * (RESTARTS as usize + 1) + run as usize]
-    };
+    let stops = recipes.iter().zip(&evolved).map(|(recipe, made)| stops(bench, recipe, made));
+    let stops = stops.collect::<Result<Vec<_>>>()?;
 
     let mut page = Page::new(
         "Figure 5: restarts",
@@ -47,22 +45,21 @@ pub(super) fn fig5(bench: &Workbench<'_>) -> Result<Page> {
         let mut rows = Vec::new();
         for (cooling, (stem, told, _)) in COOLINGS.iter().enumerate() {
             let mut cells: Vec<Cell> = Vec::new();
-            for run in 0..=RESTARTS {
-                let made = of(number, cooling, run);
+            for (run, stop) in stops[number * COOLINGS.len() + cooling].iter().enumerate() {
                 let file = format!("fig5/{}-{stem}-{run}.png", picture.name);
-                bench.folder.write_picture(&file, &made.photo)?;
-                cells.push(cell(&file, &made.score));
+                bench.folder.write_picture(&file, &stop.photo)?;
+                cells.push(cell(&file, &stop.score));
                 let mut row = vec![picture.name.clone(), (*told).to_owned(), (run + 1).to_string()];
-                row.extend(likeness(&made.score));
-                row.extend([made.births.to_string(), spread(made)]);
+                row.extend(likeness(&stop.score));
+                row.extend([stop.births.to_string(), spread_told(&stop.spread)]);
                 table.rows.push(row);
             }
             rows.push(((*told).to_owned(), cells));
         }
-        let whole: Vec<&Evolved> = (0..COOLINGS.len()).map(|cooling| of(number, cooling, RESTARTS)).collect();
-        let svg = curve_plot(bench, &picture.name, &whole)?;
+        let whole = &evolved[number * COOLINGS.len()..][..COOLINGS.len()];
+        let svg = curve_plot(bench, &picture.name, whole)?;
         bench.folder.write(&format!("fig5/{}.svg", picture.name), svg.as_bytes())?;
-        bench.folder.write(&format!("fig5/{}.csv", picture.name), &curve_table(&whole).to_csv())?;
+        bench.folder.write(&format!("fig5/{}.csv", picture.name), &curve_table(whole).to_csv())?;
         let head = (1..=RESTARTS + 1).map(|run| format!("after run {run}")).collect();
         page.push(&picture.name, Content::Pictures(PictureTable { head, rows }));
         page.push(&format!("Global fitness of {} over births", picture.name), Content::Plot(svg));
@@ -71,8 +68,29 @@ pub(super) fn fig5(bench: &Workbench<'_>) -> Result<Page> {
     Ok(page)
 }
 
+/// The best population after a run.
+struct Stop {
+    photo: Photo,
+    score: Score,
+    /// Of all runs so far.
+    births: u64,
+    spread: Spread,
+}
+
+/// What each run of an evolution led to.
+fn stops(bench: &Workbench<'_>, recipe: &Recipe, made: &Made) -> Result<Vec<Stop>> {
+    let stop = |population: &Population, births: u64| {
+        let (width_px, height_px) = (population.width_px, population.height_px);
+        let photo = bench.study.draw(recipe, population, (&Canvas::evaluation(width_px, height_px), 1))?;
+        let spread = Spread::of(&population.flies, width_px, height_px);
+        Ok(Stop { score: score(&recipe.target, &photo)?, photo, births, spread })
+    };
+    let ends = made.runs.iter().map(|end| (&end.population, end.births));
+    ends.chain([(&made.population, made.births)]).map(|(population, births)| stop(population, births)).collect()
+}
+
 /// The curves of both ways to restart, with a line at each restart.
-fn curve_plot(bench: &Workbench<'_>, name: &str, evolved: &[&Evolved]) -> Result<String> {
+fn curve_plot(bench: &Workbench<'_>, name: &str, evolved: &[Made]) -> Result<String> {
     let series = COOLINGS.iter().zip(evolved).map(|((_, told, _), made)| Series {
         label: (*told).to_owned(),
         points: made.curve.iter().map(|point| (point.births as f64, point.sae as f64)).collect(),
@@ -91,7 +109,7 @@ fn curve_plot(bench: &Workbench<'_>, name: &str, evolved: &[&Evolved]) -> Result
     plot.svg()
 }
 
-fn curve_table(evolved: &[&Evolved]) -> FigureTable {
+fn curve_table(evolved: &[Made]) -> FigureTable {
     let rows = COOLINGS.iter().zip(evolved).flat_map(|((stem, ..), made)| {
         made.curve.iter().map(|point| {
             let figures = [u64::from(point.run), point.births, point.sae, point.best_sae];

@@ -8,24 +8,23 @@ use rayon::prelude::*;
 use super::folder::Folder;
 use super::page::{Cell, FigureTable};
 use super::pictures::Picture;
+use crate::app::interrupt::SharedInterrupt;
 use crate::app::job::default_fly_count;
 use crate::app::look::{Dress, Look, LookArgs};
 use crate::app::presets::Preset;
-use crate::app::study::{Evolved, Recipe, Study};
+use crate::app::study::{Recipe, Study};
 use crate::error::Result;
-use crate::evolve::PaperScheme;
+use crate::evolve::{PaperScheme, Spread};
 use crate::metrics::Score;
 use crate::photo::Photo;
 use crate::shapes::Shader;
-
-/// Longer side of the largest picture in the paper.
-pub(super) const SIDE_MAX_PX: u32 = 512;
 
 /// The means of a figure.
 pub(super) struct Workbench<'a> {
     pub study: &'a Study<'a>,
     pub pictures: Vec<Picture>,
-    pub folder: Folder,
+    pub folder: Folder<'a>,
+    pub interrupt: &'a SharedInterrupt,
     /// Births of each run.
     pub births: u64,
     pub seed: u64,
@@ -108,8 +107,8 @@ pub(super) fn likeness(score: &Score) -> Vec<String> {
 }
 
 /// The spread of a population, as it stands in tables.
-pub(super) fn spread(evolved: &Evolved) -> String {
-    evolved.spread.clark_evans.map_or("none".to_owned(), |index| format!("{index:.3}"))
+pub(super) fn spread_told(spread: &Spread) -> String {
+    spread.clark_evans.map_or("none".to_owned(), |index| format!("{index:.3}"))
 }
 
 /// Heads of a table, as owned words.
