@@ -47,7 +47,7 @@ pub(super) struct GalleryArgs {
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Births of each of four runs (suffixes k, M)
-    #[arg(long, value_name = "B", value_parser = values::count, default_value = "20k")]
+    #[arg(long, value_name = "B", value_parser = values::count, default_value = "5k")]
     pub births: u64,
     /// Number that decides every random choice
     #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0)]
@@ -190,19 +190,26 @@ fn markdown(args: &GalleryArgs) -> String {
     }
     for shader in Shader::ALL {
         let (name, description, file) = (shader.name(), shader.description(), file_of(shader));
-        let blend = if shader.is_translucent() { format!(" (`--opacity {OPACITY}`)") } else { String::new() };
-        let _ = write!(page, "\n## `{name}`\n\nShader `{name}`{blend}: {description}.\n\n![{name}]({file})\n");
+        let blend = if shader.is_translucent() { format!(" (here with `--opacity {OPACITY}`)") } else { String::new() };
+        let columns = BuiltIn::ALL.map(BuiltIn::name).join(", ");
+        let _ = write!(page, "\n## `{name}`\n\n{description}{blend}.\n\n![{name}]({file})\n\nFrom left: {columns}.\n");
     }
     let names: Vec<String> = args.inputs.iter().map(|path| path.display().to_string()).collect();
     let _ = write!(
         page,
         "\nMade by `smalti gallery {} -o {} --births {} --seed {}`: {FLY_COUNT} tiles at {SIDE_PX} px, {} runs with steps \
-         halved at each, mean colours.\n",
+         halved at each, mean colours; {} are translucent.\n",
         names.join(" "),
         args.output.display(),
         args.births,
         args.seed,
-        RESTARTS + 1
+        RESTARTS + 1,
+        Shader::ALL
+            .iter()
+            .filter(|shader| shader.is_translucent())
+            .map(|shader| shader.name())
+            .collect::<Vec<_>>()
+            .join(", ")
     );
     page
 }

@@ -68,8 +68,8 @@ pub(super) fn fig6(bench: &Workbench<'_>) -> Result<Page> {
 
     let mut page = Page::new(
         "Figure 6: colours evolved or picked, and edges",
-        "The paper says that evolved colours give a closer likeness than colours picked from the picture at a tile's centre, \
-         and that edges are kept better than by GIMPressionist. One run of scheme 3 each; the edges are Canny's, and \
+        "Colours that evolve beside colours that are picked from the picture at a tile's centre, or are the mean or median of \
+         what a tile shows. The paper says that edges are kept, and compares with GIMPressionist. One run of scheme 3 each; the edges are Canny's, and \
          edge F1 says how well they are kept.",
     );
     let (mosaics, tables) = present(bench, "fig6", &targets, &entries)?;

@@ -143,7 +143,7 @@ fn brush(mask: &Mask) -> Vec<u8> {
     bytes
 }
 
-/// A preset of GIMPressionist: strokes of one size laid evenly, turned along what they paint, without relief.
+/// A preset of GIMPressionist: strokes of one size laid evenly over black, turned along what they paint, without relief.
 fn settings(tile_side_px: f64) -> String {
     // 7 px at 256x256 with 2,500 strokes, and in proportion.
     let size = (1.37 * tile_side_px).round().max(1.0);
@@ -151,6 +151,6 @@ fn settings(tile_side_px: f64) -> String {
     format!(
         "Preset\norientnum=12\norientfirst=0.000000\norientlast=360.000000\norienttype=6\nsizenum=1\n\
          sizefirst={size:.6}\nsizelast={size:.6}\nbrushdensity={density:.6}\nbrushrelief=0.000000\n\
-         generaldarkedge=0.000000\nselectedbrush=Brushes/smalti.pgm\ncolor=000000\nplacetype=1\n"
+         generaldarkedge=0.000000\ngeneralbgtype=0\nselectedbrush=Brushes/smalti.pgm\ncolor=000000\nplacetype=1\n"
     )
 }

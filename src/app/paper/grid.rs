@@ -129,9 +129,9 @@ pub(super) fn original_cell(figure: &str, name: &str) -> Cell {
 fn describe(preset: Preset) -> String {
     let colors = colors_told(preset);
     let shaders = match preset.shaders {
-        Shaders::One => "one shader",
-        Shaders::Two => "two shaders",
-        Shaders::OneThenTwo => "one, then two shaders",
+        Shaders::One => "rectangles",
+        Shaders::Two => "complex shapes in both runs",
+        Shaders::OneThenTwo => "rectangles, then complex shapes",
     };
     format!("{}: {} px, {colors}, {shaders}", preset.name(), preset.side_px)
 }
