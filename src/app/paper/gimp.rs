@@ -113,18 +113,17 @@ impl Files<'_> {
             match gimp.try_wait() {
                 Ok(Some(_)) => return Ok(()),
                 Ok(None) if began.elapsed() < TIME_LIMIT && !interrupt.is_requested() => {
-                    std::thread::sleep(Duration::from_millis(50))
+                    std::thread::sleep(Duration::from_millis(50));
                 }
                 outcome => {
                     // It is given up; whether it could be ended changes nothing.
                     let _ = gimp.kill();
                     let _ = gimp.wait();
-                    let why = match outcome {
+                    return Err(failed(&match outcome {
                         Err(error) => error.to_string(),
                         _ if interrupt.is_requested() => "it was interrupted".to_owned(),
                         _ => "it took more than three minutes".to_owned(),
-                    };
-                    return Err(failed(&why));
+                    }));
                 }
             }
         }

@@ -62,18 +62,14 @@ pub(super) fn fig4(bench: &Workbench<'_>) -> Result<Page> {
     let originals = bench.pictures.iter().map(|picture| picture.target(SHEET_CELL_PX, None).map(|t| photo_of(&t)));
     let originals: Vec<Photo> = originals.collect::<Result<_>>()?;
     let names = bench.picture_names();
-    let files: Vec<(String, &Photo)> = names
-        .iter()
-        .zip(&originals)
-        .map(|(name, photo)| (format!("fig4/original/{name}.png"), photo))
-        .chain(presets.iter().enumerate().flat_map(|(scheme, preset)| {
-            let (names, evolved) = (&names, &evolved);
-            row(scheme)
-                .zip(names)
-                .map(move |(k, name)| (format!("fig4/{}/{name}.png", preset.name()), &evolved[k].photo))
-        }))
-        .collect();
-    bench.write_pictures(&files)?;
+    let (original_files, mosaic_files) = (
+        names.iter().zip(&originals).map(|(name, photo)| (format!("fig4/original/{name}.png"), photo)),
+        evolved.iter().enumerate().map(|(k, made)| {
+            let (name, scheme) = (&names[k / scheme_count], presets[k % scheme_count].name());
+            (format!("fig4/{scheme}/{name}.png"), &made.photo)
+        }),
+    );
+    bench.write_pictures(&original_files.chain(mosaic_files).collect::<Vec<_>>())?;
 
     let mut rows = vec![("original".to_owned(), names.iter().map(|name| original_cell("fig4", name)).collect())];
     for (scheme, preset) in presets.iter().enumerate() {
