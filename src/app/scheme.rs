@@ -5,11 +5,10 @@ use serde_json::{Map, Value, json};
 
 use super::job::Job;
 use super::options::EvolveOptions;
-use super::values;
+use super::{provenance, values};
 use crate::error::{Error, Result};
 use crate::evolve::scheme::{MITOSIS_MAX, ONE_Q16};
 use crate::evolve::{ColorMode, PaperScheme};
-use crate::model::Rgb;
 use crate::model::operators::Rotation;
 
 /// Least and greatest factor of the first sides.
@@ -156,7 +155,11 @@ pub(super) fn decisive(scheme: &PaperScheme) -> Map<String, Value> {
     tell("tile_scale_q16", json!(scheme.tile_scale_q16), scheme.tile_scale_q16 == usual.tile_scale_q16);
     tell("mask_layers", json!(scheme.masks), scheme.masks == usual.masks);
     tell("color_mode", json!(color_mode_name(scheme.color.mode)), scheme.color.mode == usual.color.mode);
-    let palette = scheme.color.palette.as_ref().map(|palette| palette.colors().iter().map(hexadecimal).collect());
+    let palette = scheme
+        .color
+        .palette
+        .as_ref()
+        .map(|palette| palette.colors().iter().map(|color| provenance::hexadecimal(color)).collect());
     tell("palette", json!(palette.as_ref().map(|colors: &Vec<String>| colors)), palette.is_none());
     told
 }
@@ -187,10 +190,6 @@ fn color_mode_name(mode: ColorMode) -> &'static str {
         ColorMode::Mean => "mean",
         ColorMode::Median => "median",
     }
-}
-
-fn hexadecimal([r, g, b]: &Rgb) -> String {
-    format!("{r:02x}{g:02x}{b:02x}")
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use serde_json::{Map, Value, json};
 use super::BlendName;
 use crate::error::{Error, Result};
 use crate::model::fly::Genes;
+use crate::model::target::hexadecimal;
 use crate::model::{Fly, Population};
 use crate::photo;
 
@@ -75,10 +76,6 @@ impl<'a> Told<'a> {
             key: key.get(..KEY_DIGITS).unwrap_or(key),
         }
     }
-}
-
-fn hexadecimal([r, g, b]: [u8; 3]) -> String {
-    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 fn rows<'a>(population: &'a Population, fitness: &'a [i64]) -> impl Iterator<Item = Row> + 'a {

@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::model::rng::Stream;
 use crate::model::{Fly, Rgb};
 
-/// Most colours of a palette: more than anybody would call one, and few enough to look through for every birth.
-pub const PALETTE_COLORS_MAX: usize = 4_096;
+/// Most colours of a palette: few enough to look through for every birth, and as many as palette files have.
+pub const PALETTE_COLORS_MAX: usize = 256;
 
 /// A palette of at least one 8-bit sRGB colour.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,6 +5,12 @@ use crate::error::{Error, Result};
 /// An 8-bit sRGB colour.
 pub type Rgb = [u8; 3];
 
+/// A colour as `#rrggbb`.
+#[must_use]
+pub fn hexadecimal([r, g, b]: Rgb) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
 /// Largest side of a picture in px. Positions in 1/64 px stay exact in the f32 columns of population files.
 pub const TARGET_SIDE_MAX_PX: u32 = 65_535;
 

@@ -18,7 +18,8 @@ use serde_json::{Map, Value};
 use crate::error::{Error, Result};
 use crate::model::blocks::{depth_order, index_of};
 use crate::model::tables::TURN_STEPS;
-use crate::model::{Canvas, Fly, Population, Rgb};
+use crate::model::target::hexadecimal;
+use crate::model::{Canvas, Fly, Population};
 use crate::photo::{self, xml};
 
 use shapes::Shapes;
@@ -101,10 +102,6 @@ fn push_fly(svg: &mut String, fly: &Fly) {
 fn four_decimals(degrees: f64) -> String {
     let text = format!("{degrees:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
-fn hexadecimal([r, g, b]: Rgb) -> String {
-    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 /// Appends to a text, which cannot fail.

@@ -74,6 +74,17 @@ fn few_colours_are_those_of_the_target_and_a_palette_holds_the_tiles_too() {
 }
 
 #[test]
+fn picture_and_tiles_take_the_same_colour_of_a_palette() {
+    let spread = |k: u32| [(k * 37 % 256) as u8, (k * 101 % 256) as u8, (k * 59 % 256) as u8];
+    let colors: Vec<[u8; 3]> = (0..40).map(spread).collect();
+    let pixels: Vec<[u8; 3]> = (0..4_096).map(|k| spread(k * 7 + k / 256)).collect();
+    let mut photo = smalti::photo::Photo { width_px: 64, height_px: 64, pixels: pixels.clone() };
+    smalti::photo::reduce(&mut photo, &colors);
+    let palette = smalti::evolve::Palette::new(colors).expect("there are colours");
+    assert!(pixels.iter().zip(&photo.pixels).all(|(&pixel, &reduced)| palette.nearest(pixel) == reduced));
+}
+
+#[test]
 fn looks_that_make_no_sense_are_refused_in_one_sentence() {
     let workshop = Workshop::new();
     workshop.write("empty.hex", b"\n; nothing\n");

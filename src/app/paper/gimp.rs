@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::app::child::in_its_own_group;
 use crate::app::interrupt::SharedInterrupt;
 use crate::model::mask::{MASK_SIDE, Mask};
 use crate::photo::{self, Photo, ReadOptions};
@@ -57,18 +58,6 @@ pub(super) fn paint(
 
 fn failed(what: &str) -> String {
     format!("GIMP did not paint: {what}")
-}
-
-/// Ctrl-C of a terminal goes to all processes of a group; this one is ended by us.
-#[cfg(unix)]
-fn in_its_own_group(command: &mut Command) -> &mut Command {
-    use std::os::unix::process::CommandExt;
-    command.process_group(0)
-}
-
-#[cfg(not(unix))]
-fn in_its_own_group(command: &mut Command) -> &mut Command {
-    command
 }
 
 /// GIMP's folder, the picture and the result.

@@ -7,6 +7,7 @@ use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
 use super::options::AnimationFile;
+use crate::app::child::in_its_own_group;
 use crate::error::{Error, Result};
 use crate::model::Mosaic;
 use crate::photo::Timing;
@@ -166,18 +167,6 @@ fn not_started(path: &Path, error: &io::Error) -> Error {
         _ => format!("needs the program ffmpeg, which cannot be started ({error}); install the package ffmpeg anew"),
     };
     Error::output(path, format!("{reason}, or write .png or .gif"))
-}
-
-/// Ctrl-C of a terminal goes to all processes of a group; this one is ended by us, once its file may go.
-#[cfg(unix)]
-fn in_its_own_group(command: &mut Command) -> &mut Command {
-    use std::os::unix::process::CommandExt;
-    command.process_group(0)
-}
-
-#[cfg(not(unix))]
-fn in_its_own_group(command: &mut Command) -> &mut Command {
-    command
 }
 
 /// The frame with even sides, as 4:2:0 needs them: the last column and row come twice where a side is odd.
