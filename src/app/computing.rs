@@ -45,8 +45,8 @@ impl ComputingArgs {
         Ok(Computing { request, validation, threads: self.threads.map(in_range).transpose()? })
     }
 
-    /// Gives the CPU twin its threads and opens the device, which is told unless `quiet`: for commands that need nothing
-    /// else before.
+    /// Gives the CPU twin its threads and opens the device, and says so if nobody asked for the CPU: for
+    /// commands that need nothing else before.
     ///
     /// # Errors
     /// As [`ComputingArgs::check`] and [`Computing::select`].

@@ -12,13 +12,7 @@ use crate::vk::{Choice, DeviceInfo, DeviceKind, DeviceLimits, DeviceRequest, Ins
 
 /// Lists the devices; the exit code of the process.
 pub(super) fn list(args: &DevicesArgs) -> ExitCode {
-    match print_list(args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
-        }
-    }
+    report::exit_code(print_list(args))
 }
 
 fn print_list(args: &DevicesArgs) -> Result<()> {

@@ -8,14 +8,11 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::cli::ProgressKind;
-use super::computing::ComputingArgs;
 use super::interrupt::SharedInterrupt;
 use super::look::{Dress, Look, LookArgs};
-use super::options::Verbosity;
-use super::progress::Progress;
+use super::options::{Overwrite, Verbosity};
 use super::sheet::sheet;
-use super::study::{Made, Recipe, Study};
+use super::study::{Made, Recipe, Study, StudyArgs};
 use super::{report, values};
 use crate::error::{Error, Result};
 use crate::evolve::{ColorMode, ColorRule, PaperScheme};
@@ -49,20 +46,8 @@ pub(super) struct GalleryArgs {
     /// Births of each of four runs (suffixes k, M)
     #[arg(long, value_name = "B", value_parser = values::count, default_value = "5k")]
     pub births: u64,
-    /// Number that decides every random choice
-    #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0)]
-    pub seed: u64,
-    /// Write into a folder that holds other files, too
-    #[arg(long)]
-    pub force: bool,
     #[command(flatten)]
-    pub computing: ComputingArgs,
-    /// How to show progress on stderr
-    #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
-    pub progress: ProgressKind,
-    /// Say nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
+    pub study: StudyArgs,
 }
 
 /// First line of a gallery's page, which tells it from other files.
@@ -70,25 +55,19 @@ const TITLE: &str = "# Gallery of masks and shaders";
 
 /// Makes the gallery; the exit code of the process.
 pub(super) fn make(args: &GalleryArgs) -> ExitCode {
-    match try_make(args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
-        }
-    }
+    report::exit_code(try_make(args))
 }
 
 fn try_make(args: &GalleryArgs) -> Result<()> {
     let interrupt = SharedInterrupt::listen()?;
     let page = args.output.join("README.md");
-    check_folder(&args.output, &page, args.force)?;
-    let verbosity = if args.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+    check_folder(&args.output, &page, args.study.overwrite())?;
+    let verbosity = args.study.verbosity();
     let targets = args.inputs.iter().map(|path| read(path, verbosity)).collect::<Result<Vec<_>>>()?;
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
     output::check_writable(&page)?;
-    let device = args.computing.begin(verbosity)?;
+    let device = args.study.computing.begin(verbosity)?;
     let write = |path: &Path, bytes: &[u8]| {
         interrupt.check()?;
         interrupt.while_writing(|| output::write_atomically(path, bytes))
@@ -96,7 +75,7 @@ fn try_make(args: &GalleryArgs) -> Result<()> {
     // First, so that the folder is known for a gallery if this one is not finished.
     write(&page, format!("{TITLE}\n\nNot finished; run the same command again.\n").as_bytes())?;
     let began = Instant::now();
-    let study = Study::new(&device, &interrupt, Progress::new(args.progress.unless(args.quiet)));
+    let study = Study::new(&device, &interrupt, args.study.progress());
     let made = Shader::ALL.into_iter().try_for_each(|shader| {
         let bytes = make_sheet(args, &study, &targets, shader)?;
         write(&args.output.join(file_of(shader)), &bytes)
@@ -104,20 +83,18 @@ fn try_make(args: &GalleryArgs) -> Result<()> {
     study.finish();
     made?;
     write(&page, markdown(args).as_bytes())?;
-    if !args.quiet {
-        report::say(&format!("wrote {} in {:.1} s", page.display(), began.elapsed().as_secs_f64()));
-    }
+    args.study.say_written(&page, began);
     Ok(())
 }
 
 /// Refuses a folder that holds anything but a gallery: its sheets have names that other pictures may have, too.
-fn check_folder(folder: &Path, page: &Path, force: bool) -> Result<()> {
+fn check_folder(folder: &Path, page: &Path, overwrite: Overwrite) -> Result<()> {
     if folder.is_file() {
         return Err(Error::Usage(format!("{} is a file; name a folder", folder.display())));
     }
     let is_gallery = std::fs::read(page).is_ok_and(|bytes| bytes.starts_with(TITLE.as_bytes()));
     let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
-    if is_gallery || is_empty || force {
+    if is_gallery || is_empty || overwrite == Overwrite::Force {
         return Ok(());
     }
     Err(Error::Usage(format!(
@@ -164,7 +141,7 @@ fn recipe(args: &GalleryArgs, target: &Arc<Target>, shape: BuiltIn, shader: Shad
     };
     let Dress { masks, layers_by_run } = Look::new(&look, &[], None)?.dress()?;
     let scheme = PaperScheme {
-        seed: args.seed,
+        seed: args.study.seed,
         births: args.births,
         restarts: RESTARTS,
         cool_q16: 1 << 15,
@@ -202,7 +179,7 @@ fn markdown(args: &GalleryArgs) -> String {
         names.join(" "),
         args.output.display(),
         args.births,
-        args.seed,
+        args.study.seed,
         RESTARTS + 1,
         Shader::ALL
             .iter()

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 use std::path::Path;
+use std::process::ExitCode;
 use std::time::Duration;
 
 use indicatif::{BinaryBytes, HumanCount};
@@ -282,6 +283,17 @@ pub(super) fn say(line: &str) {
 pub(super) fn say_device(selected: &Selected) {
     if let Selected::Cpu { reason: Some(reason) } = selected {
         say(&format!("smalti: computing on the CPU, since {reason}"));
+    }
+}
+
+/// The exit code of what was done, after a failure has been printed.
+pub(super) fn exit_code(done: Result<()>) -> ExitCode {
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            error(&failure.to_string());
+            ExitCode::from(failure.exit_code())
+        }
     }
 }
 

@@ -1,18 +1,24 @@
 //! Evolutions of several pictures, made side by side: on the CPU one per thread, on a Vulkan device one after the
 //! other.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use clap::Args;
 use indicatif::HumanCount;
 use rayon::prelude::*;
 use serde_json::json;
 
+use super::cli::ProgressKind;
+use super::computing::ComputingArgs;
 use super::curve::{Curve, Point};
 use super::device::{Opened, Selected};
 use super::interrupt::SharedInterrupt;
+use super::options::{Overwrite, Verbosity};
 use super::progress::{Progress, Stage, short_time};
+use super::{report, values};
 use crate::engine::{Engine, Observer, side_by_side};
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, PaperScheme, Spread, StopReason, first_population};
@@ -22,6 +28,46 @@ use crate::photo::Photo;
 
 /// Generations between two looks at the clock: some milliseconds.
 const STRIDE: u32 = 256;
+
+/// The flags of commands that make many mosaics.
+#[derive(Clone, Debug, Args)]
+pub(super) struct StudyArgs {
+    /// Number that decides every random choice
+    #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0)]
+    pub seed: u64,
+    /// Write into a folder that holds other files, too
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub computing: ComputingArgs,
+    /// How to show progress on stderr
+    #[arg(long, value_enum, value_name = "KIND", default_value = "auto", help_heading = "Messages")]
+    progress: ProgressKind,
+    /// Say nothing but errors
+    #[arg(short, long, help_heading = "Messages")]
+    quiet: bool,
+}
+
+impl StudyArgs {
+    pub(super) fn verbosity(&self) -> Verbosity {
+        if self.quiet { Verbosity::Quiet } else { Verbosity::Normal }
+    }
+
+    pub(super) fn overwrite(&self) -> Overwrite {
+        if self.force { Overwrite::Force } else { Overwrite::Refuse }
+    }
+
+    pub(super) fn progress(&self) -> Progress {
+        Progress::new(self.progress.unless(self.quiet))
+    }
+
+    /// Says which page was written, and how long that took, unless nothing is to be said.
+    pub(super) fn say_written(&self, page: &Path, began: Instant) {
+        if !self.quiet {
+            report::say(&format!("wrote {} in {:.1} s", page.display(), began.elapsed().as_secs_f64()));
+        }
+    }
+}
 
 /// One evolution to make.
 #[derive(Clone, Debug)]

@@ -20,12 +20,8 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::cli::ProgressKind;
-use super::computing::ComputingArgs;
 use super::interrupt::SharedInterrupt;
-use super::options::{Overwrite, Verbosity};
-use super::progress::Progress;
-use super::study::Study;
+use super::study::{Study, StudyArgs};
 use super::{report, values};
 use crate::error::{Error, Result};
 use folder::Folder;
@@ -53,20 +49,8 @@ pub(super) struct PaperArgs {
     /// Births of each run (suffixes k, M); fewer for a quick look
     #[arg(long, value_name = "B", value_parser = values::count, default_value = "40k")]
     pub births: u64,
-    /// Number that decides every random choice
-    #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0)]
-    pub seed: u64,
-    /// Write into a folder that holds other files, too
-    #[arg(long)]
-    pub force: bool,
     #[command(flatten)]
-    pub computing: ComputingArgs,
-    /// How to show progress on stderr
-    #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
-    pub progress: ProgressKind,
-    /// Say nothing but errors
-    #[arg(short, long)]
-    pub quiet: bool,
+    pub study: StudyArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -122,18 +106,12 @@ impl Name {
 
 /// Makes what was asked for; the exit code of the process.
 pub(super) fn make(args: &PaperArgs) -> ExitCode {
-    match try_make(args) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
-        }
-    }
+    report::exit_code(try_make(args))
 }
 
 fn try_make(args: &PaperArgs) -> Result<()> {
     let interrupt = SharedInterrupt::listen()?;
-    let verbosity = if args.quiet { Verbosity::Quiet } else { Verbosity::Normal };
+    let verbosity = args.study.verbosity();
     let images = match &args.images {
         None if args.name.needs_pictures() => {
             return Err(Error::Usage("this figure needs pictures; name their folder with --images".to_owned()));
@@ -141,26 +119,21 @@ fn try_make(args: &PaperArgs) -> Result<()> {
         Some(folder) if args.name.needs_pictures() => pictures::in_folder(folder, verbosity)?,
         _ => Vec::new(),
     };
-    let overwrite = if args.force { Overwrite::Force } else { Overwrite::Refuse };
-    let folder = Folder::open(&args.output, overwrite, &interrupt)?;
-    let device = args.computing.begin(verbosity)?;
-    let progress = Progress::new(args.progress.unless(args.quiet));
+    let folder = Folder::open(&args.output, args.study.overwrite(), &interrupt)?;
+    let device = args.study.computing.begin(verbosity)?;
     let began = Instant::now();
-    let study = Study::new(&device, &interrupt, progress);
+    let study = Study::new(&device, &interrupt, args.study.progress());
     let bench = Workbench {
         study: &study,
         pictures: images,
         folder,
         interrupt: &interrupt,
         births: args.births,
-        seed: args.seed,
+        seed: args.study.seed,
     };
     let made = write_page(&bench, args.name);
     study.finish();
-    let path = bench.folder.path(&made?.0);
-    if !args.quiet {
-        report::say(&format!("wrote {} in {:.1} s", path.display(), began.elapsed().as_secs_f64()));
-    }
+    args.study.say_written(&bench.folder.path(&made?.0), began);
     Ok(())
 }
 
