@@ -12,6 +12,7 @@ pub mod engine;
 pub mod error;
 pub mod evolve;
 pub mod gpu;
+pub mod guide;
 pub mod metrics;
 pub mod model;
 pub mod openraster;

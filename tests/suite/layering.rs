@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 const LEVELS: [&[&str]; 7] = [
     &["error"],
     &["photo", "output", "model", "metrics", "plot"],
-    &["archive", "evolve", "shapes", "cpu", "vk", "vector", "openraster"],
+    &["archive", "evolve", "guide", "shapes", "cpu", "vk", "vector", "openraster"],
     &["gpu"],
     &["engine"],
     &["app"],
