@@ -6,6 +6,7 @@
 pub mod blocks;
 pub mod evaluation;
 pub mod fly;
+pub mod grout;
 pub mod lane;
 pub mod mask;
 pub mod mosaic;
@@ -20,6 +21,7 @@ pub mod translucency;
 
 pub use evaluation::{Change, Evaluation, Evaluator, Layers, NO_FLY};
 pub use fly::Fly;
+pub use grout::Grout;
 pub use lane::{Lane, Scene};
 pub use mask::{Blend, Mask, MaskSet};
 pub use mosaic::{Mosaic, Patch};

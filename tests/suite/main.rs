@@ -11,6 +11,7 @@ mod cli_scheme;
 mod determinism;
 mod exactness;
 mod files;
+mod grout;
 mod layering;
 mod layout;
 mod looks;
