@@ -12,7 +12,12 @@ layout(push_constant) uniform Push {
     ivec2 origin;
     vec2 pixel_size;
     uint first_mask;
+    // Packed colour.
+    uint grout;
 } push;
+
+// 1: tiles have a ring of grout.
+layout(constant_id = 0) const uint GROUTED = 0u;
 
 layout(location = 0) flat in uint fly;
 layout(location = 1) flat in uint rank;
@@ -33,6 +38,9 @@ void main() {
             discard;
         }
         shown = shaded(shown, texel.y);
+    }
+    if (GROUTED == 1u && !is_inside_ring(tile, uv)) {
+        shown = push.grout;
     }
     color = vec4(uvec3(shown, shown >> 8, shown >> 16) & 255u, 255.0) / 255.0;
     shown_fly = fly;

@@ -18,6 +18,7 @@ layout(push_constant) uniform Push {
     // 2 / size of the patch in px.
     vec2 pixel_size;
     uint first_mask;
+    uint grout;
 } push;
 
 layout(location = 0) flat out uint fly;

@@ -15,6 +15,7 @@ struct Tile {
     uint mask;
     uint w_inverse;
     uint h_inverse;
+    uint ring;
 };
 
 const uint NO_FLY = 0xFFFFFFFFu;
@@ -33,6 +34,13 @@ uvec2 tile_coordinates(Tile tile, int i, int j) {
 // Half-open in the tile's own frame.
 bool is_inside(Tile tile, uvec2 uv) {
     return uv.x < tile.w << 12 && uv.y < tile.h << 12;
+}
+
+// Whether a covered pixel shows the tile's own colour and not its grout. Twin: `Tile::is_inside_ring`.
+bool is_inside_ring(Tile tile, uvec2 uv) {
+    uint ring = tile.ring << 12;
+    uvec2 end = uvec2(tile.w << 12, tile.h << 12);
+    return all(lessThan(uv - ring, end - min(end, uvec2(2u * ring))));
 }
 
 // value / divisor for values below divisor << 8. Twin: `quotient` in src/model/tile.rs, which explains why it is exact.

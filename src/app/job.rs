@@ -88,6 +88,7 @@ impl Job {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
             background: self.background,
+            grout: None,
             masks: self.masks(),
             flies,
         }

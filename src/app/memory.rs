@@ -97,8 +97,14 @@ mod tests {
         let genes =
             Genes { x: 1024.0, y: 1024.0, z: 0.0, r: 0.0, g: 0.0, b: 0.0, w: 4096.0, h: 4096.0, angle_deg: 0.0 };
         let flies = vec![Fly::from_genes(&genes, 0); 3000];
-        let population =
-            Population { width_px: 2048, height_px: 2048, background: [0; 3], masks: MaskSet::default(), flies };
+        let population = Population {
+            width_px: 2048,
+            height_px: 2048,
+            background: [0; 3],
+            grout: None,
+            masks: MaskSet::default(),
+            flies,
+        };
         assert_eq!(list_bytes(&population), 3000 * 256 * 256 * 16);
     }
 

@@ -197,8 +197,14 @@ mod tests {
         let workshop = tempfile::tempdir().expect("a temporary folder");
         let folder = workshop.path().join("run");
         let save_run = SaveRun::new(&folder, Some(1)).expect("it is fine");
-        let stage =
-            Population { width_px: 9, height_px: 9, background: [0; 3], masks: MaskSet::default(), flies: Vec::new() };
+        let stage = Population {
+            width_px: 9,
+            height_px: 9,
+            background: [0; 3],
+            grout: None,
+            masks: MaskSet::default(),
+            flies: Vec::new(),
+        };
         let mut recorder = Recorder::begin(&save_run, 10, stage, Map::new()).expect("the folder is made");
         std::fs::remove_dir(&folder).expect("it is empty");
         let evolution = Evolution::new(PaperScheme::default(), 0, 9, 9, random_population(9, 9, 5, 0));

@@ -24,7 +24,7 @@ use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
 use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::model::{Population, Rgb, Scene, Target};
+use crate::model::{Blend, Grout, Population, Rgb, Scene, Target};
 use crate::vk::Validation;
 
 const EXAMPLES: &str = "\
@@ -262,6 +262,12 @@ fn adapted(mut population: Population, options: &RenderOptions) -> Result<Popula
         let worn = PaperScheme { masks: layers_by_run, ..PaperScheme::default() };
         population.flies = begin_from(&worn, population.flies);
         population.masks = masks;
+        if population.grout.is_some() && population.masks.blend() == Blend::Translucent {
+            return Err(Error::Usage(
+                "the population has grout, which translucent tiles cannot have; render it with --blend opaque"
+                    .to_owned(),
+            ));
+        }
     }
     Ok(population)
 }
@@ -307,6 +313,9 @@ impl Provenances {
         decisive.insert("width_px".to_owned(), population.width_px.into());
         decisive.insert("height_px".to_owned(), population.height_px.into());
         decisive.insert("background".to_owned(), provenance::hexadecimal(&population.background).into());
+        if let Some(Grout { width, color }) = population.grout {
+            decisive.insert("grout".to_owned(), json!({"width": width, "color": provenance::hexadecimal(&color)}));
+        }
         let with = |specific: [(&str, Value); 2]| {
             let specific = specific.into_iter().map(|(name, value)| (name.to_owned(), value));
             Provenance::of(decisive.clone().into_iter().chain(specific).collect())

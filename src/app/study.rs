@@ -112,6 +112,7 @@ impl Recipe {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
             background: [0; 3],
+            grout: None,
             masks: (*self.masks).clone(),
             flies,
         }

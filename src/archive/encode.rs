@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use super::{GENE_COLUMNS, HEADER_MEMBER, Header, SCHEMA};
+use super::{GENE_COLUMNS, HEADER_KEYS, HEADER_MEMBER, Header, SCHEMA};
 use crate::error::{Error, Result};
 use crate::model::fly::Genes;
 use crate::model::mask::MASK_SIDE;
@@ -31,7 +31,7 @@ enum Thrift {
 ///
 /// # Errors
 /// [`Error::Usage`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the file
-/// (`schema`, `width_px`, `height_px`, `background`, `blend`), or if there are more than [`FLY_COUNT_MAX`] flies.
+/// (`schema`, `width_px`, `height_px`, `background`, `blend`, `grout`), or if there are more than [`FLY_COUNT_MAX`] flies.
 pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
     let fly_count = population.flies.len();
     if fly_count != fitness.len() || fly_count > FLY_COUNT_MAX {
@@ -59,9 +59,7 @@ fn encode_members(
     meta: &Map<String, Value>,
     thrift: Thrift,
 ) -> Result<Vec<u8>> {
-    if let Some(key) =
-        ["schema", "width_px", "height_px", "background", "blend"].iter().find(|&&key| meta.contains_key(key))
-    {
+    if let Some(key) = HEADER_KEYS.iter().find(|&&key| meta.contains_key(key)) {
         return Err(Error::Usage(format!("the metadata of a population cannot have a `{key}`: the file has its own")));
     }
     write_members(population, fitness, meta, Members::new(thrift))
@@ -92,6 +90,7 @@ fn write_members(
         height_px: population.height_px,
         background: population.background,
         blend: population.masks.blend().into(),
+        grout: population.grout.map(Into::into),
         meta: meta.clone(),
     };
     members.start(HEADER_MEMBER)?;

@@ -12,7 +12,7 @@ mod table;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::model::{Blend, Population};
+use crate::model::{Blend, Grout, Population, Rgb};
 
 pub use encode::{encode, encode_snapshot};
 pub use read::{read, read_meta};
@@ -46,8 +46,34 @@ struct Header {
     /// How coverage is read; opaque masks are the rule and need no word.
     #[serde(default, skip_serializing_if = "BlendName::is_opaque")]
     blend: BlendName,
+    /// Absent if tiles are drawn to their edges.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    grout: Option<GroutEntry>,
     #[serde(flatten)]
     meta: Map<String, Value>,
+}
+
+/// Keys of [`Header`], which the writer's own cannot have.
+const HEADER_KEYS: [&str; 6] = ["schema", "width_px", "height_px", "background", "blend", "grout"];
+
+/// [`Grout`] as the file spells it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct GroutEntry {
+    /// In 1/64 px.
+    width: u32,
+    color: Rgb,
+}
+
+impl From<Grout> for GroutEntry {
+    fn from(Grout { width, color }: Grout) -> Self {
+        Self { width, color }
+    }
+}
+
+impl From<GroutEntry> for Grout {
+    fn from(GroutEntry { width, color }: GroutEntry) -> Self {
+        Self { width, color }
+    }
 }
 
 /// [`Blend`] as the file spells it.

@@ -9,9 +9,10 @@ use serde_json::{Map, Value};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-use super::{Archive, GENE_COLUMNS, HEADER_MEMBER, Header, SCHEMA};
+use super::{Archive, GENE_COLUMNS, GroutEntry, HEADER_MEMBER, Header, SCHEMA};
 use crate::error::{Error, Result};
 use crate::model::fly::{Genes, SIDE_MAX, SIDE_MIN, UNITS_PER_PX};
+use crate::model::grout::GROUT_WIDTH_MAX;
 use crate::model::mask::{MASK_LAYERS_MAX, MASK_SIDE, Texel};
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
@@ -78,8 +79,9 @@ fn read_population(path: &Path) -> Result<Archive, String> {
             fly.clamped(header.width_px, header.height_px)
         })
         .collect();
-    let Header { width_px, height_px, background, meta, .. } = header;
-    Ok(Archive { population: Population { width_px, height_px, background, masks, flies }, fitness, meta })
+    let Header { width_px, height_px, background, grout, meta, .. } = header;
+    let grout = grout.map(Into::into);
+    Ok(Archive { population: Population { width_px, height_px, background, grout, masks, flies }, fitness, meta })
 }
 
 /// Least and largest value of each of [`GENE_COLUMNS`], and half the unit that it is rounded to; angles have no end.
@@ -158,6 +160,13 @@ impl Members {
             return Err(format!(
                 "its `{HEADER_MEMBER}` gives a picture of {}x{} px; sides must be 1 to {TARGET_SIDE_MAX_PX} px",
                 header.width_px, header.height_px
+            ));
+        }
+        if let Some(GroutEntry { width, .. }) = header.grout
+            && !(1..=GROUT_WIDTH_MAX).contains(&width)
+        {
+            return Err(format!(
+                "its `{HEADER_MEMBER}` gives grout of width {width}; it must be 1 to {GROUT_WIDTH_MAX}, in 1/64 px"
             ));
         }
         Ok(header)

@@ -126,15 +126,17 @@ pub fn read_csv_meta(path: &Path) -> Result<Option<Map<String, Value>>> {
 /// # Errors
 /// [`Error::Internal`] if the rows cannot be spelt.
 pub fn encode_json(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
-    let Population { width_px, height_px, background, masks, .. } = population;
+    let Population { width_px, height_px, background, grout, masks, .. } = population;
+    let grout = grout.map(|grout| ("grout", json!({"width": grout.width, "color": hexadecimal(grout.color)})));
     let mut text = format!("{JSON_HEAD}{},\n", Value::Object(meta.clone())).into_bytes();
-    for (name, value) in [
+    let header = [
         ("width_px", json!(width_px)),
         ("height_px", json!(height_px)),
         ("background", json!(hexadecimal(*background))),
         ("blend", json!(BlendName::from(masks.blend()))),
         ("masks", json!(masks.layers().len())),
-    ] {
+    ];
+    for (name, value) in header.into_iter().chain(grout) {
         text.extend(format!("\"{name}\":{value},\n").bytes());
     }
     text.extend(b"\"flies\":[");

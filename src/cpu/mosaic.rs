@@ -17,7 +17,9 @@ const PATCH_SIDE: u32 = 256;
 pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32) -> Mosaic {
     let samples = canvas.supersampled(supersampling);
     let side = PATCH_SIDE / supersampling * supersampling;
-    let tiles: Vec<Tile> = population.flies.iter().map(|fly| Tile::bake(fly, &samples)).collect();
+    let ring_width = population.grout.map_or(0, |grout| grout.width);
+    let bake = |fly| Tile::bake_with_ring(fly, &samples, ring_width);
+    let tiles: Vec<Tile> = population.flies.iter().map(bake).collect();
     let mut lists = BlockLists::new(&samples, side);
     lists.fill(&population.flies, &tiles);
     let mut mosaic = Mosaic::new(canvas);
@@ -47,18 +49,21 @@ fn draw_patch(population: &Population, tiles: &[Tile], list: &[u64], patch: &Pat
         Blend::Opaque => {
             let mut colors = vec![pack(population.background); sample_count];
             for (tile, mask) in tiles.rev() {
-                for_each_texel(tile, mask, patch, |sample, texel| {
-                    if texel.coverage >= COVERAGE_THRESHOLD {
-                        colors[sample] = shaded(tile.color, u32::from(texel.shade));
-                    }
-                });
+                let own = |texel: Texel| shaded(tile.color, u32::from(texel.shade));
+                // Two loops, so that drawing without grout does not ask for it at every sample.
+                match population.grout.map(|grout| pack(grout.color)) {
+                    None => for_each_solid(tile, mask, patch, |sample, _, texel| colors[sample] = own(texel)),
+                    Some(grout) => for_each_solid(tile, mask, patch, |sample, (u, v), texel| {
+                        colors[sample] = if tile.is_inside_ring(u, v) { own(texel) } else { grout };
+                    }),
+                }
             }
             colors
         }
         Blend::Translucent => {
             let mut samples = vec![Compositing::START; sample_count];
             for (tile, mask) in tiles {
-                for_each_texel(tile, mask, patch, |sample, texel| {
+                for_each_texel(tile, mask, patch, |sample, _, texel| {
                     let color = shaded(tile.color, u32::from(texel.shade));
                     samples[sample].add(opacity(u32::from(texel.coverage)), unpack(color));
                 });
@@ -71,8 +76,18 @@ fn draw_patch(population: &Population, tiles: &[Tile], list: &[u64], patch: &Pat
 /// The texel that a square has everywhere.
 const FULL: Texel = Texel { coverage: 255, shade: 255 };
 
-/// Calls `visit` with each sample of the patch inside the tile's square, counted row by row, and the texel there.
-fn for_each_texel(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut(usize, Texel)) {
+/// As [`for_each_texel`], but only where the mask is solid.
+fn for_each_solid(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut(usize, (u32, u32), Texel)) {
+    for_each_texel(tile, mask, patch, |sample, place, texel| {
+        if texel.coverage >= COVERAGE_THRESHOLD {
+            visit(sample, place, texel);
+        }
+    });
+}
+
+/// Calls `visit` with each sample of the patch inside the tile's square, counted row by row, its tile coordinates and the
+/// texel there.
+fn for_each_texel(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut(usize, (u32, u32), Texel)) {
     let (left, top) = (patch.x as i32, patch.y as i32);
     let columns = tile.x0.max(left)..tile.x1.min(left + patch.width_px as i32 - 1) + 1;
     for j in tile.y0.max(top)..=tile.y1.min(top + patch.height_px as i32 - 1) {
@@ -82,7 +97,7 @@ fn for_each_texel(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut
             if u < tile.u_end() && v < tile.v_end() {
                 let (column, texel_row) = tile.texel(u, v);
                 let texel = if tile.mask == 0 { FULL } else { mask.texel(column, texel_row) };
-                visit(row + (i - left) as usize, texel);
+                visit(row + (i - left) as usize, (u, v), texel);
             }
         }
     }

@@ -155,4 +155,6 @@ pub struct MosaicPush {
     pub pixel_size: [f32; 2],
     /// Layer of the square in the mask array.
     pub first_mask: u32,
+    /// Packed colour of the grout, if there is any.
+    pub grout: u32,
 }

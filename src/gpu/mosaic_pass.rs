@@ -10,7 +10,8 @@ use super::shaders;
 use crate::error::Result;
 use crate::model::blocks::{BlockLists, depth_order, index_of};
 use crate::model::mask::MASK_SIDE;
-use crate::model::{Canvas, Fly, MaskSet, Mosaic, NO_FLY, Patch, Population};
+use crate::model::tile::pack;
+use crate::model::{Canvas, Fly, Grout, MaskSet, Mosaic, NO_FLY, Patch, Population};
 use crate::vk::{
     Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, DepthTest, Device,
     GraphicsPipeline, GraphicsShaders, Image, ImageFormat, ImageShape, Recorder, RenderTargets, Residence,
@@ -23,6 +24,7 @@ const PATCH_SIDE: u32 = 2048;
 pub(super) struct MosaicPass {
     samples: Canvas,
     background: [u8; 3],
+    grout: Option<Grout>,
     tiles: Vec<Tile>,
     ranks: Vec<u32>,
     flies: Vec<Fly>,
@@ -42,7 +44,9 @@ impl MosaicPass {
         population: &Population,
         samples: &Canvas,
     ) -> Result<Self> {
-        let tiles: Vec<Tile> = population.flies.iter().map(|fly| Tile::bake(fly, samples)).collect();
+        let ring_width = population.grout.map_or(0, |grout| grout.width);
+        let bake = |fly| Tile::bake_with_ring(fly, samples, ring_width);
+        let tiles: Vec<Tile> = population.flies.iter().map(bake).collect();
         let storage = |name: &str, bytes: usize| {
             Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
         };
@@ -50,7 +54,7 @@ impl MosaicPass {
         recorder.write_buffer(&tile_buffer, 0, bytemuck::cast_slice(&tiles))?;
         let instances = storage("mosaic instances", tiles.len() * size_of::<Instance>())?;
         let masks = create_masks(device, recorder, &population.masks)?;
-        let pipeline = create_pipeline(device)?;
+        let pipeline = create_pipeline(device, population.grout)?;
         let bindings = [Binding::Buffer(&tile_buffer), Binding::Buffer(&instances), Binding::SampledImage(&masks)];
         let side = PATCH_SIDE.min(device.info().limits.image_side_px);
         let shape =
@@ -59,6 +63,7 @@ impl MosaicPass {
         Ok(Self {
             samples: *samples,
             background: population.background,
+            grout: population.grout,
             ranks: ranks(population),
             flies: population.flies.clone(),
             tiles,
@@ -141,6 +146,7 @@ impl MosaicPass {
             origin: [patch.x as i32, patch.y as i32],
             pixel_size: [2.0 / patch.width_px as f32, 2.0 / patch.height_px as f32],
             first_mask: 0,
+            grout: self.grout.map_or(0, |grout| pack(grout.color)),
         }));
         pass.draw(4, instances.len() as u32);
         Ok(())
@@ -193,14 +199,15 @@ fn ranks(population: &Population) -> Vec<u32> {
     ranks
 }
 
-fn create_pipeline(device: &Arc<Device>) -> Result<Arc<GraphicsPipeline>> {
+fn create_pipeline(device: &Arc<Device>, grout: Option<Grout>) -> Result<Arc<GraphicsPipeline>> {
     GraphicsPipeline::create(
         device,
         &GraphicsShaders {
             name: "mosaic",
             vertex: &shaders::words(shaders::MOSAIC_VERTEX),
             fragment: &shaders::words(shaders::MOSAIC_FRAGMENT),
-            specialization: &[],
+            // Whether there is grout: without it the test of the ring is not even there.
+            specialization: &[(0, u32::from(grout.is_some()))],
             bindings: &[BindingKind::StorageBuffer, BindingKind::StorageBuffer, BindingKind::SampledImage],
             push_constant_bytes: size_of::<MosaicPush>() as u32,
             colors: &[ImageFormat::Rgba8Unorm, ImageFormat::R32Uint],

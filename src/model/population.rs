@@ -1,6 +1,7 @@
-//! The flies of one lane together with what is needed to draw them again: picture size, masks, background.
+//! The flies of one lane together with what is needed to draw them again: picture size, masks, background, grout.
 
 use super::fly::Fly;
+use super::grout::Grout;
 use super::mask::MaskSet;
 use super::target::Rgb;
 
@@ -16,6 +17,8 @@ pub struct Population {
     pub height_px: u32,
     /// Colour behind all tiles.
     pub background: Rgb,
+    /// Ring of every tile, if the tiles are opaque; `None` draws tiles to their edges.
+    pub grout: Option<Grout>,
     /// Tile shapes that `Fly::mask` refers to.
     pub masks: MaskSet,
     /// The flies; their order breaks ties in depth.

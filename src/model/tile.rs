@@ -44,6 +44,8 @@ pub struct Tile {
     pub w_inverse: u32,
     /// [`inverse`] of the height.
     pub h_inverse: u32,
+    /// Width of the ring of grout, in 4096ths of the unit of u; at most the shorter side, 0 for none.
+    pub ring: u32,
 }
 
 /// What a population is drawn on: its size, and how many canvas pixels one picture pixel spans.
@@ -101,6 +103,7 @@ impl Tile {
         mask: 0,
         w_inverse: 0,
         h_inverse: 0,
+        ring: 0,
     };
 
     /// The tile of `fly` on `canvas`; [`Tile::EMPTY`] if the fly is absent or its tile misses the canvas.
@@ -109,6 +112,13 @@ impl Tile {
     /// evaluation size that is always 1/64 px. A side beyond 2^18 px of the canvas counts as 2^18 px.
     #[must_use]
     pub fn bake(fly: &Fly, canvas: &Canvas) -> Self {
+        Self::bake_with_ring(fly, canvas, 0)
+    }
+
+    /// As [`Tile::bake`], with a ring of grout of `ring_width` in 1/64 px at evaluation size. It is scaled and rounded as
+    /// the sides are.
+    #[must_use]
+    pub fn bake_with_ring(fly: &Fly, canvas: &Canvas, ring_width: u32) -> Self {
         if !fly.alive {
             return Self::EMPTY;
         }
@@ -147,6 +157,7 @@ impl Tile {
             mask: u32::from(fly.mask),
             w_inverse: inverse(w as u32),
             h_inverse: inverse(h as u32),
+            ring: round_half_up(i64::from(ring_width) * numerator, divisor).min(w).min(h) as u32,
         }
     }
 
@@ -168,6 +179,19 @@ impl Tile {
     #[must_use]
     pub fn v_end(&self) -> u32 {
         self.h * TRIG_ONE as u32
+    }
+
+    /// Whether a covered pixel at tile coordinates `(u, v)` shows the tile's own colour; else it shows the grout.
+    ///
+    /// It is inside the ring iff `ring * 4096 <= u < (w - ring) * 4096`, and v likewise. A tile with a side of at most two
+    /// rings has no inside.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_inside_ring(&self, u: u32, v: u32) -> bool {
+        // A side is at most 2^18, and a ring no wider: twice the ring fits 32 bits, and below it the difference wraps.
+        let ring = self.ring * TRIG_ONE as u32;
+        let within = |place: u32, end: u32| place.wrapping_sub(ring) < end.saturating_sub(2 * ring);
+        within(u, self.u_end()) & within(v, self.v_end())
     }
 
     /// Tile coordinates `(u, v)` of pixel `(i, j)`, as the unsigned numbers that the coverage test compares.
@@ -339,7 +363,8 @@ mod tests {
 
     /// The tile's map and box against the same rule in 128 bits, without a box, at random pixels and around the box.
     fn check_against_wide_integers(fly: &Fly, canvas: &Canvas, stream: &mut Stream) {
-        let tile = Tile::bake(fly, canvas);
+        let ring_width = 1 << stream.below(19) >> 1;
+        let tile = Tile::bake_with_ring(fly, canvas, ring_width);
         let mut pixels: Vec<(i32, i32)> =
             (0..8).map(|_| (stream.below(canvas.width_px) as i32, stream.below(canvas.height_px) as i32)).collect();
         for (i, j) in [(tile.x0, tile.y0), (tile.x1, tile.y1), (tile.x0, tile.y1), (tile.x1, tile.y0)] {
@@ -351,12 +376,15 @@ mod tests {
         };
         for (i, j) in pixels.into_iter().filter(on_canvas) {
             let in_box = (tile.x0..=tile.x1).contains(&i) && (tile.y0..=tile.y1).contains(&j);
-            let found = in_box && covered(&tile, i, j);
-            assert_eq!(found, covered_in_wide_integers(fly, canvas, i, j), "{fly:?} on {canvas:?} at {i}, {j}");
+            let (u, v) = tile.coordinates(i, j);
+            let found = (in_box && covered(&tile, i, j)).then(|| tile.is_inside_ring(u, v));
+            let expected = inside_in_wide_integers(fly, canvas, ring_width, (i, j));
+            assert_eq!(found, expected, "{fly:?} on {canvas:?} with a ring of {ring_width} at {i}, {j}");
         }
     }
 
-    fn covered_in_wide_integers(fly: &Fly, canvas: &Canvas, i: i32, j: i32) -> bool {
+    /// Whether a pixel is inside the ring; none if it is not covered.
+    fn inside_in_wide_integers(fly: &Fly, canvas: &Canvas, ring_width: u32, (i, j): (i32, i32)) -> Option<bool> {
         let (numerator, denominator) = (i128::from(canvas.scale.0), i128::from(canvas.scale.1));
         let rounded = |value: i128, divisor: i128| (2 * value + divisor).div_euclid(2 * divisor);
         let largest = i128::from(SIDE_MAX);
@@ -372,6 +400,10 @@ mod tests {
         let u = dx * i128::from(cos) + dy * i128::from(sin);
         let v = dy * i128::from(cos) - dx * i128::from(sin);
         let (half_w, half_h) = (side(fly.w) * 2048, side(fly.h) * 2048);
-        (-half_w..half_w).contains(&u) && (-half_h..half_h).contains(&v)
+        let ring = rounded(i128::from(ring_width) * numerator * units_per_px, divisor) * 4096;
+        let within = |inset: i128| {
+            (inset - half_w..half_w - inset).contains(&u) && (inset - half_h..half_h - inset).contains(&v)
+        };
+        within(0).then(|| within(ring))
     }
 }

@@ -2,11 +2,13 @@
 //!
 //! Geometry comes from the integer genes alone. A user unit is 1/128 px, half of a gene's unit, so that the corners of
 //! tiles before they are turned are whole numbers; the view box begins at -64, since the centre of pixel (0, 0) is the origin. Masks
-//! stand once in `<defs>` (`shapes.rs`). Plain SVG 1.1 without scripts, fonts or links, the same bytes every time.
+//! stand once in `<defs>` (`shapes.rs`). A tile with grout is its shape in the grout's colour, and what lies inside its ring
+//! over that. Plain SVG 1.1 without scripts, fonts or links, the same bytes every time.
 
 mod base64;
 mod outline;
 mod shapes;
+mod tiles;
 
 use std::fmt::Write;
 use std::fs::File;
@@ -17,12 +19,12 @@ use serde_json::{Map, Value};
 
 use crate::error::{Error, Result};
 use crate::model::blocks::{depth_order, index_of};
-use crate::model::tables::TURN_STEPS;
 use crate::model::target::hexadecimal;
-use crate::model::{Canvas, Fly, Population};
+use crate::model::{Blend, Canvas, Fly, Population};
 use crate::photo::{self, xml};
 
 use shapes::Shapes;
+use tiles::push_fly;
 
 /// User units per pixel of the picture that evolved.
 const UNITS_PER_PX: f64 = 128.0;
@@ -39,14 +41,16 @@ pub fn encode(population: &Population, canvas: &Canvas, told: &Map<String, Value
     let order = depth_order(&population.flies);
     let flies: Vec<&Fly> =
         order.iter().rev().map(|&key| &population.flies[index_of(key) as usize]).filter(|fly| fly.alive).collect();
+    // Translucent tiles have no ring.
+    let grout = population.grout.filter(|_| population.masks.blend() == Blend::Opaque);
     let shapes = Shapes::of(population, &flies)?;
     let mut svg = head(canvas, flies.len(), told);
     svg.push_str(shapes.definitions());
     let (width, height) = extent(canvas);
     let color = hexadecimal(population.background);
     push(&mut svg, format_args!("<path d=\"M-64-64h{width}v{height}h-{width}z\" fill=\"{color}\"/>\n"));
-    for fly in flies {
-        push_fly(&mut svg, fly);
+    for (number, fly) in flies.into_iter().enumerate() {
+        push_fly(&mut svg, number, fly, grout);
     }
     svg.push_str("</svg>\n");
     Ok(svg.into_bytes())
@@ -74,36 +78,6 @@ fn extent(canvas: &Canvas) -> (f64, f64) {
     (side(canvas.width_px), side(canvas.height_px))
 }
 
-/// The tile of one fly: a rectangle turned about its centre, or a mask that is stretched, turned and moved to its place.
-fn push_fly(svg: &mut String, fly: &Fly) {
-    let (x, y, w, h) = (2 * i64::from(fly.x), 2 * i64::from(fly.y), i64::from(fly.w), i64::from(fly.h));
-    // The engine knows 4,096 directions.
-    let direction = (usize::from(fly.angle) * TURN_STEPS) >> 16;
-    let degrees = four_decimals(direction as f64 * 360.0 / TURN_STEPS as f64);
-    let color = hexadecimal(fly.color());
-    if fly.mask > 0 {
-        let rotate = if direction == 0 { String::new() } else { format!("rotate({degrees})") };
-        // A side of w genes is 2w units, over the 256 units of a mask.
-        let [across, along] = [w, h].map(|side| side as f64 / 128.0);
-        let transform = format!("translate({x} {y}){rotate}scale({across} {along})");
-        let mask = fly.mask;
-        push(svg, format_args!("<use xlink:href=\"#m{mask}\" transform=\"{transform}\" fill=\"{color}\"/>\n"));
-        return;
-    }
-    let (left, top, width, height) = (x - w, y - h, 2 * w, 2 * h);
-    push(svg, format_args!("<path d=\"M{left} {top}h{width}v{height}h-{width}z\""));
-    if direction != 0 {
-        push(svg, format_args!(" transform=\"rotate({degrees} {x} {y})\""));
-    }
-    push(svg, format_args!(" fill=\"{color}\"/>\n"));
-}
-
-/// An angle in degrees, off by at most 0.00005: a corner of the largest tile moves by less than a gene's unit.
-fn four_decimals(degrees: f64) -> String {
-    let text = format!("{degrees:.4}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
 /// Appends to a text, which cannot fail.
 fn push(svg: &mut String, text: std::fmt::Arguments<'_>) {
     svg.write_fmt(text).expect("a string takes everything");
@@ -126,14 +100,6 @@ pub fn read_meta(path: &Path) -> Result<Option<Map<String, Value>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn angles_are_as_short_as_they_can_be() {
-        assert_eq!(
-            [0.087_890_625, 45.0, 359.912_109_375, 90.5, 100.0].map(four_decimals),
-            ["0.0879", "45", "359.9121", "90.5", "100"]
-        );
-    }
 
     #[test]
     fn the_view_box_of_a_rounded_canvas_keeps_the_scale() {

@@ -1,4 +1,5 @@
-//! Masks as SVG definitions: `#m1`, `#m2`, .. for every layer that is worn, filled by who uses it.
+//! Masks as SVG definitions: `#m1`, `#m2`, .. for every layer that is worn, filled by who uses it. With grout there are
+//! `#o1`, `#o2`, .. beside them: the outlines without shade.
 //!
 //! An opaque mask is the outline of its solid texels, a translucent one a picture whose alpha is the coverage. Shade is
 //! black over the colour: c * shade / 255 is c under black of opacity 255 - shade.
@@ -21,11 +22,10 @@ pub(super) struct Shapes {
 impl Shapes {
     /// The masks of `population` that `flies` wear; the full square needs none.
     pub(super) fn of(population: &Population, flies: &[&Fly]) -> Result<Self> {
-        let blend = population.masks.blend();
         let mut definitions = String::new();
         for (layer, mask) in population.masks.layers().iter().enumerate().skip(1) {
             if flies.iter().any(|fly| usize::from(fly.mask) == layer) {
-                push_definition(&mut definitions, layer, mask, blend)?;
+                push_definition(&mut definitions, layer, mask, population)?;
             }
         }
         if !definitions.is_empty() {
@@ -40,7 +40,8 @@ impl Shapes {
     }
 }
 
-fn push_definition(svg: &mut String, layer: usize, mask: &Mask, blend: Blend) -> Result<()> {
+fn push_definition(svg: &mut String, layer: usize, mask: &Mask, population: &Population) -> Result<()> {
+    let blend = population.masks.blend();
     let is_there = |texel: &Texel| match blend {
         Blend::Opaque => texel.coverage >= COVERAGE_THRESHOLD,
         Blend::Translucent => texel.coverage > 0,
@@ -53,19 +54,21 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, blend: Blend) ->
         String::new()
     };
     match blend {
+        Blend::Opaque if population.grout.is_some() => {
+            let outline = outline(mask);
+            push(
+                svg,
+                format_args!("<path id=\"o{layer}\" fill-rule=\"evenodd\" clip-rule=\"evenodd\" d=\"{outline}\"/>\n"),
+            );
+            push_cut_out(svg, layer, &format!("<use xlink:href=\"#o{layer}\"/>"), &shade);
+        }
         Blend::Opaque if !is_shaded => {
             let outline = outline(mask);
             push(svg, format_args!("<path id=\"m{layer}\" fill-rule=\"evenodd\" d=\"{outline}\"/>\n"));
         }
         Blend::Opaque => {
             let outline = outline(mask);
-            push(
-                svg,
-                format_args!(
-                    "<clipPath id=\"c{layer}\"><path clip-rule=\"evenodd\" d=\"{outline}\"/></clipPath>\n\
-                     <g id=\"m{layer}\" clip-path=\"url(#c{layer})\"><path d=\"{SQUARE}\"/>{shade}</g>\n"
-                ),
-            );
+            push_cut_out(svg, layer, &format!("<path clip-rule=\"evenodd\" d=\"{outline}\"/>"), &shade);
         }
         Blend::Translucent => {
             // White with alpha: luminance and alpha agree in whatever colour space they are taken.
@@ -82,6 +85,17 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, blend: Blend) ->
         }
     }
     Ok(())
+}
+
+/// The square under its `shade`, cut to `shape`.
+fn push_cut_out(svg: &mut String, layer: usize, shape: &str, shade: &str) {
+    push(
+        svg,
+        format_args!(
+            "<clipPath id=\"c{layer}\">{shape}</clipPath>\n\
+             <g id=\"m{layer}\" clip-path=\"url(#c{layer})\"><path d=\"{SQUARE}\"/>{shade}</g>\n"
+        ),
+    );
 }
 
 /// A picture of texels with hard edges: `pixelated` is the word of browsers, the attribute that of SVG 1.1.

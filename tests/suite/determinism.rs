@@ -28,6 +28,7 @@ fn evolve(evaluator: Box<dyn Evaluator>, scheme: PaperScheme) -> Result {
         width_px,
         height_px,
         background: scene.background,
+        grout: None,
         masks: (*scene.masks).clone(),
         flies: best.clone(),
     };

@@ -41,11 +41,12 @@ fn check_scenario(evaluator: &mut dyn Evaluator, scenario: &Scenario) {
     assert_eq!(mosaic.pixels, reference.colors(), "{name}: drawn mosaic");
 }
 
-fn population(scene: &Scene, flies: &[Fly]) -> Population {
+pub fn population(scene: &Scene, flies: &[Fly]) -> Population {
     Population {
         width_px: scene.target.width_px(),
         height_px: scene.target.height_px(),
         background: scene.background,
+        grout: None,
         masks: (*scene.masks).clone(),
         flies: flies.to_vec(),
     }

@@ -79,7 +79,8 @@ fn twins() -> Vec<Twin> {
     vec![
         twin!(Tile = "Tile" in Array of ["compose.comp", "evaluate.comp", "mosaic.frag", "translucent.comp"] {
             x0 = "x0", y0 = "y0", x1 = "x1", y1 = "y1", u0 = "u0", v0 = "v0", cos = "cos_step", sin = "sin_step",
-            w = "w", h = "h", color = "color", mask = "mask", w_inverse = "w_inverse", h_inverse = "h_inverse"
+            w = "w", h = "h", color = "color", mask = "mask", w_inverse = "w_inverse", h_inverse = "h_inverse",
+            ring = "ring"
         }),
         twin!(LaneRecord = "Lane" in Array of ["evaluate.comp", "translucent.comp"] {
             first_fly = "first_fly", first_mask = "first_mask", background = "background", sum = "sum"
@@ -110,7 +111,7 @@ fn twins() -> Vec<Twin> {
             item_count = "item_count", background = "background"
         }),
         twin!(MosaicPush = "Push" in PushConstants of ["mosaic.vert", "mosaic.frag"] {
-            origin = "origin", pixel_size = "pixel_size", first_mask = "first_mask"
+            origin = "origin", pixel_size = "pixel_size", first_mask = "first_mask", grout = "grout"
         }),
     ]
 }

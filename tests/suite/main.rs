@@ -12,6 +12,7 @@ mod determinism;
 mod exactness;
 mod files;
 mod guides;
+mod grout;
 mod layering;
 mod layout;
 mod looks;

@@ -1,6 +1,9 @@
 //! `smalti render`: populations drawn again and written in other formats.
 
 use serde_json::{Value, json};
+use smalti::archive::{self, Archive};
+use smalti::cpu::CpuEvaluator;
+use smalti::model::{Canvas, Evaluator, Grout, Population};
 use smalti::photo;
 
 use crate::cli_refusals::refused;
@@ -38,7 +41,7 @@ fn at_the_evolved_size_the_picture_is_the_one_that_was_scored() {
     let [drawn, evolved] = ["c.csv", "evolved.csv"].map(|name| String::from_utf8(workshop.read(name)).unwrap());
     let columns = |line: &str| line.split(',').take(13).collect::<Vec<_>>().join(",");
     assert!(drawn.lines().map(columns).eq(evolved.lines().map(columns)), "fitness and all");
-    let archives = ["flies.npz", "d.npz"].map(|name| smalti::archive::read(&workshop.path(name)).unwrap());
+    let archives = ["flies.npz", "d.npz"].map(|name| archive::read(&workshop.path(name)).unwrap());
     assert!(archives[0].population == archives[1].population && archives[0].fitness == archives[1].fitness);
     assert_eq!(render(&workshop, "-o - -q").stdout, workshop.read("a.png"));
 }
@@ -86,6 +89,32 @@ fn another_background_shows_where_no_tile_is_and_only_there() {
     assert!((1..blue.pixels().len() as u32).contains(&changed), "{changed} pixels");
 }
 
+/// `flies.npz` with a change.
+fn change(workshop: &Workshop, change: impl FnOnce(&mut Population)) -> Population {
+    let Archive { mut population, fitness, meta } = archive::read(&workshop.path("flies.npz")).unwrap();
+    change(&mut population);
+    workshop.write("changed.npz", &archive::encode(&population, &fitness, &meta).unwrap());
+    population
+}
+
+#[test]
+fn the_grout_of_a_population_is_drawn_again_and_decides_what_may_be_replaced() {
+    let workshop = workshop("");
+    let grout = Grout { width: 50, color: [255, 0, 255] };
+    let population = change(&workshop, |population| population.grout = Some(grout));
+    render(&workshop, "-o a.png --output-size 90 --supersample 2");
+    refused(&workshop, "render changed.npz -o a.png --output-size 90 --supersample 2", 2, "made with other options");
+    let run = |line: &str| assert_eq!(workshop.run(line).code, Some(0), "{line}");
+    run("render changed.npz -o b.png -o b.npz -o b.svg --output-size 90 --supersample 2");
+    let drawn = CpuEvaluator::new(vec![]).draw(&population, &Canvas::scaled(40, 30, 90), 2).unwrap();
+    assert_eq!(workshop.pixels("b.png").as_raw(), drawn.pixels.as_flattened());
+    assert_ne!(workshop.pixels("b.png"), workshop.pixels("a.png"));
+    assert_eq!(archive::read(&workshop.path("b.npz")).unwrap().population, population);
+    assert!(String::from_utf8(workshop.read("b.svg")).unwrap().contains("fill=\"#ff00ff\""));
+    run("render changed.npz -o c.png --mask disc --blend opaque");
+    refused(&workshop, "render changed.npz -o d.png --mask disc --blend translucent", 2, "has grout");
+}
+
 #[test]
 fn more_samples_soften_edges() {
     let workshop = workshop("-o evolved.png");
@@ -117,7 +146,7 @@ fn the_metadata_tells_what_decides_the_picture_and_where_its_flies_came_from() {
     assert_eq!([&found["output_size_px"], &found["supersampling"]], [50, 3]);
     assert_eq!([&found["background"], &found["software"]], ["336699", "smalti"]);
     assert_eq!(found["origin_key"], told(&workshop, "evolved.png")["key"]);
-    let population = smalti::archive::read(&workshop.path("b.npz")).unwrap().meta;
+    let population = archive::read(&workshop.path("b.npz")).unwrap().meta;
     assert_eq!(population["origin_key"], found["origin_key"]);
     assert!(!found.to_string().contains("flies.npz"), "{found}");
 }
@@ -199,10 +228,7 @@ fn populations_that_cannot_be_used_are_refused_and_nothing_is_written_or_lost() 
     let column = |value: f32| npy("<f4", "(60,)", &value.to_le_bytes().repeat(60));
     let with = |name: &str, content: Vec<u8>| Members::of(&npz).with(name, content).zipped();
     let other = json!({"schema": 2, "width_px": 40, "height_px": 30, "background": [0, 0, 0]}).to_string();
-    let empty = smalti::model::Population {
-        flies: vec![],
-        ..smalti::archive::read(&workshop.path("flies.npz")).unwrap().population
-    };
+    let empty = Population { flies: vec![], ..archive::read(&workshop.path("flies.npz")).unwrap().population };
     for (bytes, words) in [
         (npz[..npz.len() / 2].to_vec(), "bad.npz: is not a population"),
         (b"".to_vec(), "bad.npz: is not a population"),
@@ -212,7 +238,7 @@ fn populations_that_cannot_be_used_are_refused_and_nothing_is_written_or_lost() 
         (with("w.npy", column(-1.0)), "bad.npz: its column `w` has -1.0 (fly 0); it must be 0.25 to 4096"),
         (with("r.npy", column(2.0)), "bad.npz: its column `r` has 2.0 (fly 0); it must be 0 to 1"),
         (Members::of(&npz).without("angle.npy").zipped(), "bad.npz: is not a population: it has no `angle.npy`"),
-        (smalti::archive::encode(&empty, &[], &serde_json::Map::new()).unwrap(), "bad.npz: holds no flies"),
+        (archive::encode(&empty, &[], &serde_json::Map::new()).unwrap(), "bad.npz: holds no flies"),
     ] {
         workshop.write("bad.npz", &bytes);
         refused(&workshop, "render bad.npz -o a.png -o b.svg --force", 2, words);

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use smalti::Error;
 use smalti::archive::{Archive, encode, read};
 use smalti::model::mask::Texel;
-use smalti::model::{Fly, Mask, MaskSet, Population};
+use smalti::model::{Fly, Grout, Mask, MaskSet, Population};
 use zip::write::SimpleFileOptions;
 use zip::{ZipArchive, ZipWriter};
 
@@ -25,6 +25,7 @@ pub fn population() -> Population {
         width_px: SIDE_PX,
         height_px: SIDE_PX,
         background: [1, 2, 3],
+        grout: None,
         masks: masks.expect("two layers"),
         flies,
     }
@@ -86,6 +87,31 @@ fn a_population_comes_back_as_it_was() {
     assert_eq!(archive.meta, meta());
 }
 
+/// `meta.json` of a file, with its keys in place.
+fn header(bytes: &[u8]) -> Value {
+    let Members(members) = Members::of(bytes);
+    let (_, text) = members.iter().find(|(name, _)| name == "meta.json").expect("it is there");
+    serde_json::from_slice(text).expect("it is JSON")
+}
+
+#[test]
+fn grout_comes_back_as_it_was_and_a_file_without_any_does_not_speak_of_it() {
+    let grouted = Population { grout: Some(Grout { width: 77, color: [250, 0, 9] }), ..population() };
+    let bytes = encode(&grouted, &fitness(), &meta()).expect("it can be encoded");
+    assert_eq!(header(&bytes)["grout"], json!({"width": 77, "color": [250, 0, 9]}));
+    let archive = read_bytes(&bytes).expect("it is ours");
+    assert_eq!(archive.population.grout, grouted.grout);
+    assert!(encode(&archive.population, &archive.fitness, &archive.meta).expect("it can be encoded") == bytes);
+    assert_eq!(header(&ours()).get("grout"), None);
+    for width in [0, 131_073] {
+        let mut told = header(&bytes);
+        told["grout"]["width"] = json!(width);
+        let message = refusal(&Members::of(&bytes).with("meta.json", told.to_string().into_bytes()).zipped());
+        let expected = format!("its `meta.json` gives grout of width {width}; it must be 1 to 131072, in 1/64 px");
+        assert_eq!(message, expected);
+    }
+}
+
 #[test]
 fn an_empty_population_comes_back_as_it_was() {
     let empty = Population { flies: vec![], masks: MaskSet::default(), ..population() };
@@ -108,9 +134,11 @@ fn saving_what_was_loaded_gives_the_same_bytes_and_always_the_same() {
 fn what_cannot_be_read_back_is_not_written() {
     let population = population();
     assert!(encode(&population, &fitness()[1..], &meta()).is_err());
-    let mut reserved = meta();
-    reserved.insert("width_px".to_owned(), json!(1));
-    assert!(encode(&population, &fitness(), &reserved).is_err());
+    for key in ["width_px", "grout"] {
+        let mut reserved = meta();
+        reserved.insert(key.to_owned(), json!(1));
+        assert!(encode(&population, &fitness(), &reserved).is_err());
+    }
 }
 
 /// The members of a `.npz` file, to be changed and zipped again.

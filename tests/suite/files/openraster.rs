@@ -4,7 +4,7 @@ use std::io::{Cursor, Read};
 
 use image::{RgbImage, RgbaImage};
 use smalti::cpu::CpuEvaluator;
-use smalti::model::{Canvas, Evaluator, Fly, MaskSet, Mosaic, Population};
+use smalti::model::{Canvas, Evaluator, Fly, Grout, MaskSet, Mosaic, Population};
 use smalti::openraster::{self, Layers};
 use smalti::photo::{self, Photo};
 use zip::ZipArchive;
@@ -69,7 +69,7 @@ fn populations() -> impl Iterator<Item = (&'static str, Population)> {
         let (target, masks) = (&scenario.scene.target, (*scenario.scene.masks).clone());
         let (width_px, height_px) = (target.width_px(), target.height_px());
         let background = [1, 130, 255];
-        (scenario.name, Population { width_px, height_px, background, masks, flies: scenario.flies })
+        (scenario.name, Population { width_px, height_px, background, grout: None, masks, flies: scenario.flies })
     })
 }
 
@@ -83,9 +83,13 @@ fn at_evaluation_size_the_layers_are_together_exactly_the_merged_picture() {
         assert!(composed(&ora) == whole, "{name}");
         let living = population.flies.iter().filter(|fly| fly.alive).count();
         assert_eq!(stacked(&ora).len(), 1 + living.min(8), "{name}");
-        count += 1;
+        let grouted = Population { grout: Some(Grout { width: 70, color: [9, 255, 130] }), ..population };
+        let grouted = encoded(&grouted, &canvas, 1);
+        let merged = image::load_from_memory(&member(&grouted, "mergedimage.png")).unwrap().to_rgb8();
+        assert!(composed(&grouted) == merged, "{name} with grout");
+        count += u32::from(merged != whole);
     }
-    assert!(count >= 8, "only {count} populations");
+    assert!(count >= 8, "only {count} populations that show grout");
 }
 
 #[test]
@@ -107,8 +111,14 @@ fn the_bands_have_their_place_in_depth_and_the_background_a_layer_of_its_own() {
     let fly =
         |k: u32| Fly { x: 64 * 4 * k as i32 + 96, y: 96, z: k, w: 256, h: 256, r: 65_535, alive: true, ..Fly::ABSENT };
     let masks = MaskSet::default();
-    let population =
-        Population { width_px: 40, height_px: 4, background: [0, 9, 0], masks, flies: (0..9).rev().map(fly).collect() };
+    let population = Population {
+        width_px: 40,
+        height_px: 4,
+        background: [0, 9, 0],
+        grout: None,
+        masks,
+        flies: (0..9).rev().map(fly).collect(),
+    };
     let ora = encoded(&population, &Canvas::evaluation(40, 4), 1);
     let stacked = stacked(&ora);
     let names: Vec<&str> = stacked.iter().map(|(_, name)| name.as_str()).collect();
@@ -126,7 +136,8 @@ fn the_bands_have_their_place_in_depth_and_the_background_a_layer_of_its_own() {
 #[test]
 fn a_population_without_a_living_fly_has_a_background_only() {
     let masks = MaskSet::default();
-    let population = Population { width_px: 5, height_px: 4, background: [7; 3], masks, flies: vec![Fly::ABSENT; 3] };
+    let population =
+        Population { width_px: 5, height_px: 4, background: [7; 3], grout: None, masks, flies: vec![Fly::ABSENT; 3] };
     let ora = encoded(&population, &Canvas::evaluation(5, 4), 1);
     assert_eq!(stacked(&ora).len(), 1);
     assert!(composed(&ora).pixels().all(|pixel| pixel.0 == [7; 3]));

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use smalti::archive::{encode_csv, encode_json, read_csv_meta, read_json_meta};
 use smalti::model::fly::Genes;
-use smalti::model::{Blend, Fly, Population};
+use smalti::model::{Blend, Fly, Grout, Population};
 
 use super::archives::{fitness, population};
 use crate::workshop::Workshop;
@@ -64,6 +64,11 @@ fn a_json_table_is_one_object_and_loses_no_bit() {
     assert_eq!(table["meta"], Value::Object(meta));
     let header = ["width_px", "height_px", "background", "blend", "masks"].map(|name| table[name].clone());
     assert_eq!(header, [json!(300), json!(300), json!("#010203"), json!("translucent"), json!(2)]);
+    assert_eq!(table.get("grout"), None);
+    let grout = Some(Grout { width: 9, color: [255, 0, 1] });
+    let grouted = encode_json(&Population { grout, ..population }, &fitness(), &Map::new()).unwrap();
+    let grouted: Value = serde_json::from_slice(&grouted).unwrap();
+    assert_eq!(grouted["grout"], json!({"width": 9, "color": "#ff0001"}));
     let spelt = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     let flies = table["flies"].as_array().unwrap();
     assert!(flies.iter().all(|fly| fly.as_object().unwrap().len() == COLUMNS.len()));

@@ -7,7 +7,7 @@ use resvg::usvg::{Options, Tree};
 use serde_json::{Map, json};
 use smalti::cpu::CpuEvaluator;
 use smalti::model::mask::{MASK_SIDE, Texel};
-use smalti::model::{Blend, Canvas, Evaluator, Fly, Mask, MaskSet, Mosaic, Population, Rgb, Scene};
+use smalti::model::{Blend, Canvas, Evaluator, Fly, Grout, Mask, MaskSet, Mosaic, Population, Rgb, Scene};
 use smalti::{archive, vector};
 
 use super::photo_path;
@@ -44,7 +44,7 @@ fn numbered(population: &Population) -> Population {
     let unshaded = |mask: &Mask| Mask::new(mask.texels().iter().map(|&texel| Texel { shade: 255, ..texel }).collect());
     let masks = population.masks.layers()[1..].iter().map(|mask| unshaded(mask).unwrap()).collect();
     let masks = MaskSet::with_layers(masks).unwrap();
-    Population { background: [255; 3], flies, masks, ..*population }
+    Population { background: [255; 3], grout: None, flies, masks, ..*population }
 }
 
 /// Compares every pixel whose samples, and the row of samples around them, all see one fly: resvg must give each channel a
@@ -97,6 +97,7 @@ fn population_of(scene: &Scene, flies: Vec<Fly>) -> Population {
         width_px: scene.target.width_px(),
         height_px: scene.target.height_px(),
         background: scene.background,
+        grout: None,
         masks: (*scene.masks).clone(),
         flies,
     }
@@ -166,6 +167,20 @@ fn masks_with_holes_and_shades_come_out_of_resvg_as_ours() {
 }
 
 #[test]
+fn tiles_and_masks_with_grout_come_out_of_resvg_as_ours() {
+    let plain = MaskSet::with_layers(vec![blob(255)]).unwrap();
+    let shaded = MaskSet::with_layers(vec![blob(100), blob(255)]).unwrap();
+    for (seed, masks, width) in
+        [(11, MaskSet::default(), 90), (12, plain, 150), (13, shaded, 150), (14, holed_masks(), 80)]
+    {
+        let grout = Some(Grout { width, color: [250, 240, 5] });
+        let population = Population { grout, ..random_population(masks, 5.0..40.0, seed) };
+        assert_compared(compare(&population, 96, 2), 0.2);
+        assert_compared(compare(&population, 192, 2), 0.4);
+    }
+}
+
+#[test]
 fn a_translucent_tile_shows_what_lies_behind_as_far_as_its_coverage_lets_it() {
     let texel = |index: usize| if index % MASK_SIDE < 128 { (51, 255) } else { (204, 128) };
     let texel = |index| Texel { coverage: texel(index).0, shade: texel(index).1 };
@@ -174,7 +189,8 @@ fn a_translucent_tile_shows_what_lies_behind_as_far_as_its_coverage_lets_it() {
     let (centre, side) = (32 * 7, 64 * 40);
     let [x, y, w, h] = [centre, centre, side, side];
     let fly = Fly { x, y, w: w as u32, h: h as u32, r: 65_535, g: 0, b: 32_896, mask: 1, alive: true, ..Fly::ABSENT };
-    let population = Population { width_px: 8, height_px: 8, background: [0, 200, 100], masks, flies: vec![fly] };
+    let population =
+        Population { width_px: 8, height_px: 8, background: [0, 200, 100], grout: None, masks, flies: vec![fly] };
     let svg = vector::encode(&population, &Canvas::evaluation(8, 8), &Map::new()).unwrap();
     let found = drawn_by_resvg(&svg);
     // A fifth of (255, 0, 128) on the left, four fifths of its half on the right.
