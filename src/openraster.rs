@@ -56,7 +56,8 @@ impl Layers {
         let Canvas { width_px, height_px, .. } = *canvas;
         let pixel_count = width_px as usize * height_px as usize;
         let [r, g, b] = population.background;
-        let background = photo::encode_png_with_alpha(width_px, height_px, &vec![[r, g, b, 255]; pixel_count])?;
+        let background =
+            photo::encode_png_with_alpha(width_px, height_px, &vec![[r, g, b, 255]; pixel_count], &Metadata::new())?;
         let mut layers = vec![("Background".to_owned(), background)];
         let bands = bands(&population.flies, band_count);
         for (number, flies) in (1..).zip(&bands) {
@@ -66,7 +67,7 @@ impl Layers {
                 evaluator.draw(&band, canvas, supersampling)
             };
             let (black, white) = (over([0; 3])?, over([255; 3])?);
-            let png = photo::encode_png_with_alpha(width_px, height_px, &cut_out(&black, &white))?;
+            let png = photo::encode_png_with_alpha(width_px, height_px, &cut_out(&black, &white), &Metadata::new())?;
             layers.push((band_name(number, bands.len()), png));
         }
         let longest = population.width_px.max(population.height_px);

@@ -162,6 +162,10 @@ pub(super) struct EvolveArgs {
     /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: black, or as in --init]
     #[arg(long, value_name = "COLOR", value_parser = values::color, help_heading = "Picture")]
     pub background: Option<Rgb>,
+    /// Map that tells where likeness matters, a picture with the proportions of IN: an error counts 16 times as much where
+    /// the map is white as where it is black [default: alike everywhere]
+    #[arg(long, value_name = "MAP", help_heading = "Picture")]
+    pub weight: Option<PathBuf>,
     /// Population to begin with, a .npz file of the same picture size; it also gives the number of tiles
     #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]
     pub init: Option<PathBuf>,

@@ -102,20 +102,20 @@ impl CurveFile {
     }
 }
 
-/// The files that were named, checked against the other outputs and the input, before anything is read.
+/// The files that were named, checked against the other outputs and the inputs, before anything is read.
 ///
 /// # Errors
-/// [`Error::Usage`] if a file is named twice or is the input; [`Error::Output`] if it cannot be written.
+/// [`Error::Usage`] if a file is named twice or is an input; [`Error::Output`] if it cannot be written.
 pub(super) fn check_writable<'a>(
     curves: &[CurveFile],
     others: impl Iterator<Item = &'a Destination>,
-    input: &Path,
+    inputs: &[&Path],
 ) -> Result<()> {
     let mut seen: Vec<PathBuf> = others.map(|other| destination::place_of(&other.path)).collect();
     for CurveFile { path, .. } in curves {
         let place = destination::place_of(path);
-        if place == destination::place_of(input) {
-            return Err(Error::Usage(format!("{} is the input; name another file for the curve", path.display())));
+        if destination::is_one_of(&place, inputs) {
+            return Err(Error::Usage(format!("{} is an input; name another file for the curve", path.display())));
         }
         if seen.contains(&place) {
             return Err(Error::Usage(format!("{} is named twice as an output", path.display())));

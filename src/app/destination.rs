@@ -128,8 +128,9 @@ pub(super) fn check_fits_formats(outputs: &[Destination], (width_px, height_px):
     }
 }
 
-/// Checks, before anything is read, that every destination can be written, none is named twice, and none is the input.
-pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destination>, input: &Path) -> Result<()> {
+/// Checks, before anything is read, that every destination can be written, none is named twice, and none is one of
+/// `inputs`.
+pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destination>, inputs: &[&Path]) -> Result<()> {
     let mut seen: Vec<PathBuf> = Vec::new();
     for destination in destinations {
         let place = place_of(&destination.path);
@@ -146,9 +147,9 @@ pub(super) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destinat
                 return Err(Error::output(Path::new("stdout"), reason));
             }
         } else {
-            if place == place_of(input) {
+            if is_one_of(&place, inputs) {
                 return Err(Error::Usage(format!(
-                    "{} is the input; name another file for the output",
+                    "{} is an input; name another file for the output",
                     destination.path.display()
                 )));
             }
@@ -202,10 +203,39 @@ fn stdout_is_closed() -> bool {
     false
 }
 
+/// Whether a place is that of one of these files.
+pub(super) fn is_one_of(place: &Path, paths: &[&Path]) -> bool {
+    paths.iter().any(|path| place == place_of(path))
+}
+
 /// One name for one file, however it was written.
 pub(super) fn place_of(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     path.canonicalize()
         .or_else(|_| Ok(folder.canonicalize()?.join(path.file_name().unwrap_or_default())))
         .unwrap_or_else(|_: std::io::Error| path.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_in_the_place_of_any_input_is_refused_by_name() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [picture, map, output] = ["picture.png", "map.png", "out.png"].map(|name| folder.path().join(name));
+        for path in [&picture, &map] {
+            std::fs::write(path, b"whatever").expect("the folder is ours");
+        }
+        let inputs = [picture.as_path(), map.as_path()];
+        let check = |path: &Path| {
+            let destination = Destination::for_result(path).expect("it ends in .png");
+            check_writable(std::iter::once(&destination), &inputs)
+        };
+        check(&output).expect("it is no input");
+        for written in [map.clone(), folder.path().join("./map.png"), picture.clone()] {
+            let refusal = check(&written).expect_err("it is an input").to_string();
+            assert!(refusal.starts_with(&format!("{} is an input", written.display())), "{refusal}");
+        }
+    }
 }

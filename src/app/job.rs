@@ -3,14 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use super::cli::SchemeName;
 use super::look::Dress;
 use super::memory;
 use super::options::{Colors, EvolveOptions};
 use crate::archive;
 use crate::error::{Error, Result};
 use crate::evolve::{Palette, PaperScheme, begin_from, first_population};
+use crate::model::target::weight_of_luma;
 use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
-use crate::photo::{self, Loaded, Photo, ReadOptions};
+use crate::photo::{self, Background, Loaded, Photo, ReadOptions};
 
 /// The inputs of one evolution, read and fitted together.
 #[derive(Debug)]
@@ -44,17 +46,16 @@ impl Job {
         let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
         let of_init = init.as_ref().map(|population| population.background);
         let background = options.background.or(of_init).unwrap_or_default();
-        let reading = ReadOptions { background, long_side_px: Some(options.long_side_px) };
-        let Loaded { mut photo, original_width_px, original_height_px, sha256, warnings } =
-            photo::read(&options.input, &reading)?;
-        let palette = reduce_colors(&mut photo, &options.colors)?;
+        let behind = if keeps_transparency(options) { Background::Transparent } else { Background::Color(background) };
+        let reading = ReadOptions { background: behind, long_side_px: Some(options.long_side_px) };
+        let Picture { target, palette, original_size_px, sha256, warnings } =
+            Picture::read(&options.input, &reading, &options.colors, options.weight.as_deref())?;
         let dress = dress(options, init.as_ref())?;
         let mut scheme = options.scheme.clone();
         if let Some(dress) = &dress {
             scheme.masks.clone_from(&dress.layers_by_run);
         }
         scheme.color.palette = palette.map(Palette::new).transpose()?;
-        let target = Target::new(photo.width_px, photo.height_px, photo.pixels)?;
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
             let pixel_count = u64::from(target.width_px()) * u64::from(target.height_px());
@@ -65,7 +66,7 @@ impl Job {
         Ok(Self {
             fly_count: fly_count.unwrap_or_else(|| default_fly_count(target.width_px(), target.height_px())),
             target: Arc::new(target),
-            original_size_px: (original_width_px, original_height_px),
+            original_size_px,
             input_sha256: sha256,
             warnings,
             background,
@@ -122,12 +123,63 @@ fn dress(options: &EvolveOptions, init: Option<&Population>) -> Result<Option<Dr
     Ok(Some(options.look.dress()?).filter(|dress| !dress.is_plain()))
 }
 
-/// Reduces the picture to the colours asked for; returns those that the tiles are held to, too.
-fn reduce_colors(photo: &mut Photo, colors: &Colors) -> Result<Option<Vec<Rgb>>> {
+/// Whether transparent pixels of the picture stay so: the paper knows only opaque pictures, and a background that was
+/// asked for is meant to show.
+fn keeps_transparency(options: &EvolveOptions) -> bool {
+    let scheme_knows_it = match options.scheme_name {
+        SchemeName::Paper => false,
+    };
+    scheme_knows_it && options.background.is_none()
+}
+
+/// The target, and what is worth knowing about the file that it is from.
+#[derive(Debug)]
+struct Picture {
+    target: Target,
+    /// The colours that the tiles are held to, if they are.
+    palette: Option<Vec<Rgb>>,
+    original_size_px: (u32, u32),
+    sha256: String,
+    warnings: Vec<String>,
+}
+
+impl Picture {
+    /// Reads the picture at `input`, reduces its colours, and weighs its pixels by the map at `weight`.
+    fn read(input: &Path, reading: &ReadOptions, colors: &Colors, weight: Option<&Path>) -> Result<Self> {
+        let Loaded { mut photo, transparent, original_width_px, original_height_px, sha256, warnings } =
+            photo::read(input, reading)?;
+        if transparent.as_ref().is_some_and(|transparent| !transparent.contains(&false)) {
+            let reason = "is transparent everywhere; name a --background that it shows on, or another picture";
+            return Err(Error::input(input, reason));
+        }
+        let palette = reduce_colors(&mut photo, transparent.as_deref(), colors)?;
+        let Photo { width_px, height_px, pixels } = photo;
+        let mut target = Target::new(width_px, height_px, pixels)?;
+        if let Some(transparent) = transparent {
+            target = target.with_transparent(transparent)?;
+        }
+        if let Some(map) = weight {
+            let lumas = photo::read_weights(map, width_px, height_px)?;
+            target = target.with_weights(lumas.into_iter().map(weight_of_luma).collect())?;
+        }
+        Ok(Self { target, palette, original_size_px: (original_width_px, original_height_px), sha256, warnings })
+    }
+}
+
+/// Reduces the picture to the colours asked for; returns those that the tiles are held to, too. What is transparent has no
+/// colour, and does not count.
+fn reduce_colors(photo: &mut Photo, transparent: Option<&[bool]>, colors: &Colors) -> Result<Option<Vec<Rgb>>> {
     match colors {
         Colors::Full => Ok(None),
         Colors::Few(count) => {
-            let palette = photo::palette_of(photo, *count)?;
+            let palette = match transparent {
+                None => photo::palette_of(&photo.pixels, *count)?,
+                Some(transparent) => {
+                    let is_opaque = |&(_, &is_transparent): &(&Rgb, &bool)| !is_transparent;
+                    let opaque = photo.pixels.iter().zip(transparent).filter(is_opaque).map(|(&color, _)| color);
+                    photo::palette_of(&opaque.collect::<Vec<Rgb>>(), *count)?
+                }
+            };
             photo::reduce(photo, &palette);
             Ok(None)
         }
@@ -166,8 +218,98 @@ pub(super) fn default_fly_count(width_px: u32, height_px: u32) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::default_fly_count;
+pub(super) mod tests {
+    use std::ffi::OsStr;
+    use std::path::PathBuf;
+
+    use clap::Parser;
+    use tempfile::TempDir;
+
+    use super::*;
+    use crate::app::cli::{Cli, Command};
+
+    /// A folder with `cut.png`, whose left column is opaque and in two colours, `clear.png` without an opaque pixel, and
+    /// `map.png`; the pictures have 2x2 px.
+    fn folder() -> (TempDir, impl Fn(&str) -> PathBuf) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let root = folder.path().to_owned();
+        let path = move |name: &str| root.join(name);
+        let write = |name: &str, pixels: [[u8; 4]; 4]| {
+            let png = photo::encode_png_with_alpha(2, 2, &pixels, &vec![]).expect("four pixels are 2x2");
+            std::fs::write(path(name), png).expect("the folder is ours");
+        };
+        write("cut.png", [[200, 0, 0, 255], [0, 0, 9, 0], [0, 0, 200, 255], [0, 9, 0, 127]]);
+        write("clear.png", [[255, 255, 255, 127]; 4]);
+        write("map.png", [[0, 0, 0, 255], [255; 4], [17, 17, 17, 255], [255, 255, 255, 0]]);
+        (folder, path)
+    }
+
+    /// What `smalti evolve` would do with this picture and these flags.
+    pub(in crate::app) fn plan(input: &Path, flags: &[&str]) -> (EvolveOptions, Job) {
+        let line = ["smalti", "evolve", "-o", "out.png"].into_iter().chain(flags.iter().copied()).map(OsStr::new);
+        let cli = Cli::try_parse_from(line.chain([input.as_os_str()])).expect("the command is right");
+        let Command::Evolve(args) = cli.command else { panic!("this is another command") };
+        let options = EvolveOptions::new(&args).expect("the flags are right");
+        let job = Job::load(&options).expect("the picture can be read");
+        (options, job)
+    }
+
+    const KEPT: ReadOptions = ReadOptions { background: Background::Transparent, long_side_px: None };
+
+    #[test]
+    fn a_target_has_the_planes_that_picture_and_map_give_it() {
+        let (_folder, path) = folder();
+        let (cut, map) = (path("cut.png"), path("map.png"));
+        let target = Picture::read(&cut, &KEPT, &Colors::Full, Some(&map)).expect("they fit together").target;
+        assert_eq!(target.pixels(), [[200, 0, 0], [0; 3], [0, 0, 200], [0; 3]]);
+        assert_eq!(target.transparent(), Some(&[false, true, false, true][..]));
+        assert_eq!(target.weights(), Some(&[1, 16, 2, 1][..]));
+        let plain = Picture::read(&cut, &ReadOptions::default(), &Colors::Full, None).expect("it can be read").target;
+        assert_eq!((plain.transparent(), plain.weights()), (None, None));
+    }
+
+    #[test]
+    fn what_is_transparent_takes_no_place_among_few_colours() {
+        let (_folder, path) = folder();
+        let read = |reading| Picture::read(&path("cut.png"), reading, &Colors::Few(2), None).map(|read| read.target);
+        let kept = read(&KEPT).expect("it can be read");
+        assert_eq!([kept.pixels()[0], kept.pixels()[2]], [[200, 0, 0], [0, 0, 200]]);
+        let over_black = read(&ReadOptions::default()).expect("it can be read");
+        assert_ne!([over_black.pixels()[0], over_black.pixels()[2]], [[200, 0, 0], [0, 0, 200]]);
+    }
+
+    #[test]
+    fn a_picture_without_an_opaque_pixel_is_refused_unless_it_has_a_background() {
+        let (_folder, path) = folder();
+        let clear = path("clear.png");
+        let refusal = Picture::read(&clear, &KEPT, &Colors::Full, None).expect_err("no tile is wanted anywhere");
+        assert_eq!(refusal.exit_code(), 2);
+        assert!(refusal.to_string().contains("clear.png: is transparent everywhere"), "{refusal}");
+        Picture::read(&clear, &ReadOptions::default(), &Colors::Full, None).expect("it shows on black");
+    }
+
+    #[test]
+    fn a_map_that_does_not_fit_or_is_not_there_is_refused_by_its_name() {
+        let (_folder, path) = folder();
+        let photo = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/photos/rgb.png");
+        let square = photo::encode_png_with_alpha(40, 40, &[[255; 4]; 1600], &vec![]).expect("1,600 pixels are 40x40");
+        std::fs::write(path("square.png"), square).expect("the folder is ours");
+        for (map, reason) in [("square.png", "a map of 40x40 px does not fit"), ("none.png", "there is no such file")] {
+            let refusal =
+                Picture::read(&photo, &KEPT, &Colors::Full, Some(&path(map))).expect_err("it is no map of it");
+            assert_eq!(refusal.exit_code(), 2);
+            assert!(refusal.to_string().contains(&format!("{map}: {reason}")), "{refusal}");
+        }
+    }
+
+    #[test]
+    fn the_papers_scheme_shows_transparent_pixels_on_the_background() {
+        let (_folder, path) = folder();
+        let (_, job) = plan(&path("cut.png"), &[]);
+        assert_eq!((job.target.transparent(), job.target.pixels()[3]), (None, [0, 4, 0]));
+        let (_, job) = plan(&path("cut.png"), &["--background", "ffffff"]);
+        assert_eq!((job.target.transparent(), job.target.pixels()[3]), (None, [128, 132, 128]));
+    }
 
     #[test]
     fn the_default_number_of_flies_gives_both_rows_of_table_2() {

@@ -1,6 +1,7 @@
 //! What the command line means: every value checked, every default filled in that needs no picture.
 
-use std::path::PathBuf;
+use std::iter;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
@@ -78,10 +79,13 @@ pub(super) struct EvolveOptions {
     /// Longer side in px that the picture is reduced to.
     pub long_side_px: u32,
     pub colors: Colors,
+    /// Map of where likeness matters; `None` means alike everywhere.
+    pub weight: Option<PathBuf>,
     pub look: Look,
     /// `None` means the one of `init`, else black.
     pub background: Option<Rgb>,
     pub init: Option<PathBuf>,
+    pub scheme_name: SchemeName,
     pub scheme: PaperScheme,
     pub time_limit: Option<Duration>,
     pub computing: Computing,
@@ -95,6 +99,7 @@ impl EvolveOptions {
     /// # Errors
     /// [`Error::Usage`] that names the flag and what it may be.
     pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
+        check_scheme_knows(args)?;
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
         let validation = if args.validate { Validation::On } else { Validation::Off };
         let preset_side = args.preset.map(|preset| u64::from(preset.side_px));
@@ -110,9 +115,11 @@ impl EvolveOptions {
             fly_count: fly_count.map(|count| count as usize),
             long_side_px: side_px("--size", args.size.unwrap_or(preset_side.unwrap_or(LONG_SIDE_PX)))?,
             colors: colors(args),
+            weight: args.weight.clone(),
             look: Look::new(&args.look, &args.restart_masks, args.preset)?,
             background: args.background,
             init: args.init.clone(),
+            scheme_name: args.scheme,
             scheme: scheme(args)?,
             time_limit: args.time,
             computing: args.computing.check(validation)?,
@@ -132,6 +139,11 @@ impl EvolveOptions {
         }
         destination::check_size_has_use(&options.outputs, options.output_long_side_px)?;
         Ok(options)
+    }
+
+    /// The pictures that decide the target, none of which may be written over.
+    pub(super) fn picture_inputs(&self) -> Vec<&Path> {
+        iter::once(&self.input).chain(&self.weight).map(PathBuf::as_path).collect()
     }
 
     /// Every file that will be written.
@@ -160,6 +172,17 @@ fn colors(args: &EvolveArgs) -> Colors {
         (None, Some(ColorCount::Few(count))) => Colors::Few(count),
         (None, Some(ColorCount::Full)) => Colors::Full,
         (None, None) => of_preset.map_or(Colors::Full, Colors::Few),
+    }
+}
+
+/// Refuses flags that the scheme has no use for.
+fn check_scheme_knows(args: &EvolveArgs) -> Result<()> {
+    match args.scheme {
+        SchemeName::Paper if args.weight.is_some() => {
+            let sentence = "--weight: the paper's scheme weighs all pixels alike; use --scheme cells";
+            Err(Error::Usage(sentence.to_owned()))
+        }
+        SchemeName::Paper => Ok(()),
     }
 }
 

@@ -126,6 +126,10 @@ impl Provenance {
             if let Some(count) = job.color_count {
                 specific.insert("colors".to_owned(), count.into());
             }
+            // Not of the fitted picture, which is the same with any weights.
+            if let Some(weights) = job.target.weights() {
+                specific.insert("weights_sha256".to_owned(), hexadecimal(&Sha256::digest(weights)).into());
+            }
         }
         Self::new(job, target_sha256, specific)
     }
@@ -140,6 +144,10 @@ impl Provenance {
         decisive.insert("input_sha256".to_owned(), job.input_sha256.clone().into());
         // The file does not decide alone: another version of a decoder may make other pixels of it.
         decisive.insert("target_sha256".to_owned(), target_sha256.into());
+        if let Some(transparent) = job.target.transparent() {
+            let hash = hexadecimal(&Sha256::digest(bytemuck::cast_slice(transparent)));
+            decisive.insert("transparent_sha256".to_owned(), hash.into());
+        }
         decisive.insert("width_px".to_owned(), job.target.width_px().into());
         decisive.insert("height_px".to_owned(), job.target.height_px().into());
         decisive.insert("background".to_owned(), hexadecimal(&job.background).into());
@@ -296,7 +304,43 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
     use super::*;
+    use crate::app::job::tests::plan;
+    use crate::model::Target;
+
+    #[test]
+    fn weights_and_transparency_are_in_the_keys_of_what_they_decide_and_nowhere_if_there_are_none() {
+        let (options, mut job) = plan(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/photos/rgb.png"), &[]);
+        let plain = job.target.as_ref().clone();
+        let count = plain.pixels().len();
+        let mut provenances = |target: Result<Target>| {
+            job.target = Arc::new(target.expect("the planes fit"));
+            let Provenances { picture, population, target } = Provenances::new(&options, &job, None);
+            [picture, population, target]
+        };
+        let keys = |all: &[Provenance; 3]| all.each_ref().map(|provenance| provenance.key().to_owned());
+        let tells = |all: &[Provenance; 3], word| all.each_ref().map(|one| one.describe(None).contains_key(word));
+        let (mut weights, mut transparent) = (vec![1; count], vec![false; count]);
+        let of_plain = provenances(Ok(plain.clone()));
+        let of_even = provenances(plain.clone().with_weights(vec![16; count]));
+        assert_eq!(keys(&of_even), keys(&of_plain));
+        (weights[7], transparent[7]) = (2, true);
+        let of_weighted = provenances(plain.clone().with_weights(weights));
+        let of_cut = provenances(plain.with_transparent(transparent));
+        for (all, weighted, cut) in [
+            (&of_plain, [false; 3], [false; 3]),
+            (&of_weighted, [true, true, false], [false; 3]),
+            (&of_cut, [false; 3], [true; 3]),
+        ] {
+            assert_eq!((tells(all, "weights_sha256"), tells(all, "transparent_sha256")), (weighted, cut));
+            for (index, is_told) in weighted.into_iter().zip(cut).map(|(weighted, cut)| weighted || cut).enumerate() {
+                assert_eq!(keys(all)[index] != keys(&of_plain)[index], is_told, "key {index}");
+            }
+        }
+    }
 
     #[test]
     fn of_two_results_of_one_command_the_complete_one_is_better_then_the_later_run_then_the_lower_sae() {

@@ -206,7 +206,7 @@ pub(super) fn render(args: &RenderArgs) -> ExitCode {
 /// The work, in order: check, read, draw, encode and write.
 fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
     options.computing.start_threads()?;
-    destination::check_writable(options.outputs.iter(), &options.input)?;
+    destination::check_writable(options.outputs.iter(), &[&options.input])?;
     let selected = options.computing.select()?;
     row.device = Some(selected.label().to_owned());
 

@@ -6,7 +6,7 @@ use super::outputs::{Drawn, EncodedFile, View};
 use super::provenance::{self, Ending, Provenance};
 use crate::error::{Error, Result};
 use crate::metrics::Difference;
-use crate::model::{Canvas, Evaluator, Population};
+use crate::model::{Canvas, Evaluator, Population, Rgb};
 use crate::photo::{self, Photo};
 
 /// What an evolution led to.
@@ -62,7 +62,50 @@ pub(super) fn encode_target<'a>(
 ) -> Result<Option<EncodedFile<'a>>> {
     let Some(destination) = &options.save_target else { return Ok(None) };
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
-    let photo = Photo { width_px, height_px, pixels: job.target.pixels().to_vec() };
-    let bytes = photo::encode_png(&photo, &provenance::picture_metadata(&provenance.describe(None)))?;
+    let metadata = provenance::picture_metadata(&provenance.describe(None));
+    let pixels = job.target.pixels();
+    let bytes = if let Some(transparent) = job.target.transparent() {
+        let with_alpha =
+            |(&[r, g, b], &is_transparent): (&Rgb, &bool)| if is_transparent { [0; 4] } else { [r, g, b, 255] };
+        let pixels: Vec<[u8; 4]> = pixels.iter().zip(transparent).map(with_alpha).collect();
+        photo::encode_png_with_alpha(width_px, height_px, &pixels, &metadata)?
+    } else {
+        photo::encode_png(&Photo { width_px, height_px, pixels: pixels.to_vec() }, &metadata)?
+    };
     Ok(Some(EncodedFile { destination, bytes }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::app::job::tests::plan;
+    use crate::app::provenance::Provenances;
+
+    #[test]
+    fn the_saved_target_is_clear_where_it_is_transparent_and_tells_its_key() {
+        let photo = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/photos/rgb.png");
+        let (options, mut job) = plan(&photo, &["--save-target", "target.png"]);
+        let opaque = job.target.as_ref().clone();
+        let mut transparent = vec![false; opaque.pixels().len()];
+        transparent[64] = true;
+        for plane in [None, Some(&transparent)] {
+            let target = plane.map_or(Ok(opaque.clone()), |plane| opaque.clone().with_transparent(plane.clone()));
+            job.target = Arc::new(target.expect("the plane fits"));
+            let provenance = Provenances::new(&options, &job, None).target;
+            let file =
+                encode_target(&options, &job, &provenance).expect("it can be encoded").expect("it was asked for");
+            let told = photo::png_metadata(&file.bytes);
+            assert!(told.iter().any(|(_, text)| text.contains(provenance.key())), "{told:?}");
+            let written = image::load_from_memory(&file.bytes).expect("it is a picture");
+            assert_eq!(written.color().has_alpha(), plane.is_some());
+            for (index, (pixel, color)) in written.to_rgba8().pixels().zip(opaque.pixels()).enumerate() {
+                let is_clear = plane.is_some_and(|plane| plane[index]);
+                let expected = if is_clear { [0; 4] } else { [color[0], color[1], color[2], 255] };
+                assert_eq!(pixel.0, expected, "pixel {index}");
+            }
+        }
+    }
 }

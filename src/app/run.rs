@@ -47,11 +47,12 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
 fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let mut interrupt = Interrupt::listen()?;
     options.computing.start_threads()?;
-    destination::check_writable(options.destinations(), &options.input)?;
-    curve_file::check_writable(&options.curves, options.destinations(), &options.input)?;
+    let inputs = options.picture_inputs();
+    destination::check_writable(options.destinations(), &inputs)?;
+    curve_file::check_writable(&options.curves, options.destinations(), &inputs)?;
     let written = options.destinations().map(|destination| &destination.path);
     let mut written = written.chain(options.curves.iter().map(|file| &file.path)).map(PathBuf::as_path);
-    options.save_run.iter().try_for_each(|save_run| save_run.check_place(&mut written, &options.input))?;
+    options.save_run.iter().try_for_each(|save_run| save_run.check_place(&mut written, &inputs))?;
     let selected = options.computing.select()?;
     row.device = Some(selected.label().to_owned());
 

@@ -10,7 +10,7 @@ use super::{report, values};
 use crate::error::{Error, Result};
 use crate::metrics::{Picture, Reference, Score};
 use crate::model::Rgb;
-use crate::photo::{self, Photo, ReadOptions};
+use crate::photo::{self, Background, Photo, ReadOptions};
 
 /// Exit code when some of the pictures could not be scored.
 const EXIT_SOME_FAILED: u8 = 3;
@@ -150,7 +150,7 @@ fn score_one(reference: &Reference<'_>, path: &Path, background: Rgb) -> Result<
 
 /// Reads a picture, and says what was ignored in it.
 fn read(path: &Path, background: Rgb) -> Result<Photo> {
-    let loaded = photo::read(path, &ReadOptions { background, long_side_px: None })?;
+    let loaded = photo::read(path, &ReadOptions { background: Background::Color(background), long_side_px: None })?;
     for warning in &loaded.warnings {
         report::error(&format!("{}: {warning}", path.display()));
     }

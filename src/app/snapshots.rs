@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::destination::place_of;
+use super::destination::{is_one_of, place_of};
 use super::options::{Overwrite, in_range};
 use super::provenance::SOFTWARE;
 use crate::archive;
@@ -52,14 +52,14 @@ impl SaveRun {
         Ok(Self { folder: folder.to_owned(), every })
     }
 
-    /// Checks, before anything is read, that the folder is none of the other outputs and not the input.
+    /// Checks, before anything is read, that the folder is none of the other outputs and no input.
     ///
     /// # Errors
     /// [`Error::Usage`] if it is.
-    pub(super) fn check_place<'a>(&self, mut others: impl Iterator<Item = &'a Path>, input: &Path) -> Result<()> {
+    pub(super) fn check_place<'a>(&self, mut others: impl Iterator<Item = &'a Path>, inputs: &[&Path]) -> Result<()> {
         let (place, folder) = (place_of(&self.folder), self.folder.display());
-        if place == place_of(input) {
-            return Err(Error::Usage(format!("{folder} is the input; name another folder for the snapshots")));
+        if is_one_of(&place, inputs) {
+            return Err(Error::Usage(format!("{folder} is an input; name another folder for the snapshots")));
         }
         if others.any(|other| place_of(other) == place) {
             return Err(Error::Usage(format!("{folder} is named twice as an output")));

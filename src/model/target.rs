@@ -13,13 +13,23 @@ pub fn hexadecimal([r, g, b]: Rgb) -> String {
 
 /// Largest side of a picture in px. Positions in 1/64 px stay exact in the f32 columns of population files.
 pub const TARGET_SIDE_MAX_PX: u32 = 65_535;
+/// Largest weight of a pixel: an error of at most 765 then still fits 14 bits.
+pub const WEIGHT_MAX: u8 = 16;
 
-/// The pixels to match: 8-bit sRGB, row by row from the top, no alpha.
+/// The weight of a pixel, 1 to [`WEIGHT_MAX`], where a map of weights has this luma: black is 1, white is the most.
+#[must_use]
+pub fn weight_of_luma(luma: u8) -> u8 {
+    1 + ((u32::from(luma) * u32::from(WEIGHT_MAX - 1) * 2 + 255) / 510) as u8
+}
+
+/// The pixels to match: 8-bit sRGB, row by row from the top; and, where not all of them matter alike, how much they do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
     width_px: u32,
     height_px: u32,
     pixels: Vec<Rgb>,
+    weights: Option<Vec<u8>>,
+    transparent: Option<Vec<bool>>,
 }
 
 impl Target {
@@ -34,13 +44,36 @@ impl Target {
                 "a picture of {width_px}x{height_px} px cannot be evolved: sides must be 1 to {TARGET_SIDE_MAX_PX} px"
             )));
         }
-        if pixels.len() != width_px as usize * height_px as usize {
-            return Err(Error::TooLarge(format!(
-                "a picture of {width_px}x{height_px} px cannot have {} pixels",
-                pixels.len()
-            )));
+        check_count((width_px, height_px), pixels.len(), "pixels")?;
+        Ok(Self { width_px, height_px, pixels, weights: None, transparent: None })
+    }
+
+    /// The same pixels, where the error of each counts times its weight, 1 to [`WEIGHT_MAX`], row by row from the top.
+    ///
+    /// Only proportions matter, so the weights are divided by what divides them all; if that makes all of them 1, the
+    /// target has none.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] if their count does not fit the size; [`Error::Usage`] if one is out of range.
+    pub fn with_weights(mut self, mut weights: Vec<u8>) -> Result<Self> {
+        check_count((self.width_px, self.height_px), weights.len(), "weights")?;
+        if let Some(wrong) = weights.iter().find(|weight| !(1..=WEIGHT_MAX).contains(*weight)) {
+            return Err(Error::Usage(format!("the weight of a pixel is 1 to {WEIGHT_MAX}, not {wrong}")));
         }
-        Ok(Self { width_px, height_px, pixels })
+        let divisor = weights.iter().copied().fold(0, greatest_common_divisor);
+        weights.iter_mut().for_each(|weight| *weight /= divisor);
+        self.weights = Some(weights).filter(|weights| weights.iter().any(|&weight| weight != 1));
+        Ok(self)
+    }
+
+    /// The same pixels, where no tile is wanted at those that are true, row by row from the top; if none is, all is opaque.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] if their count does not fit the size.
+    pub fn with_transparent(mut self, transparent: Vec<bool>) -> Result<Self> {
+        check_count((self.width_px, self.height_px), transparent.len(), "pixels that are transparent or not")?;
+        self.transparent = Some(transparent).filter(|transparent| transparent.contains(&true));
+        Ok(self)
     }
 
     /// Width in px.
@@ -59,5 +92,85 @@ impl Target {
     #[must_use]
     pub fn pixels(&self) -> &[Rgb] {
         &self.pixels
+    }
+
+    /// What the error of every pixel is multiplied by, row by row, 1 to [`WEIGHT_MAX`] and with no common divisor; none
+    /// if all pixels count alike.
+    #[must_use]
+    pub fn weights(&self) -> Option<&[u8]> {
+        self.weights.as_deref()
+    }
+
+    /// Whether no tile is wanted at a pixel, row by row; none if tiles are wanted everywhere.
+    #[must_use]
+    pub fn transparent(&self) -> Option<&[bool]> {
+        self.transparent.as_deref()
+    }
+}
+
+fn check_count((width_px, height_px): (u32, u32), count: usize, what: &str) -> Result<()> {
+    if count == width_px as usize * height_px as usize {
+        return Ok(());
+    }
+    Err(Error::TooLarge(format!("a picture of {width_px}x{height_px} px cannot have {count} {what}")))
+}
+
+fn greatest_common_divisor(a: u8, b: u8) -> u8 {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn target() -> Target {
+        Target::new(2, 2, vec![[9, 8, 7]; 4]).expect("four pixels are 2x2")
+    }
+
+    #[test]
+    fn the_luma_of_a_map_becomes_the_nearest_of_16_weights() {
+        for luma in 0..=255_u8 {
+            let nearest = 1 + (f64::from(luma) * 15.0 / 255.0).round() as u8;
+            assert_eq!(weight_of_luma(luma), nearest, "luma {luma}");
+        }
+        assert_eq!([0, 255].map(weight_of_luma), [1, WEIGHT_MAX]);
+    }
+
+    #[test]
+    fn weights_are_divided_by_their_common_divisor() {
+        let weighted = target().with_weights(vec![4, 16, 8, 4]).expect("four weights in range");
+        assert_eq!(weighted.weights(), Some(&[1, 4, 2, 1][..]));
+        let coprime = target().with_weights(vec![16, 16, 3, 16]).expect("four weights in range");
+        assert_eq!(coprime.weights(), Some(&[16, 16, 3, 16][..]));
+    }
+
+    #[test]
+    fn a_uniform_map_of_any_weight_is_no_map() {
+        for weight in 1..=WEIGHT_MAX {
+            assert_eq!(target().with_weights(vec![weight; 4]).expect("four weights in range"), target());
+        }
+        let replaced = target().with_weights(vec![1, 2, 3, 4]).and_then(|weighted| weighted.with_weights(vec![7; 4]));
+        assert_eq!(replaced.expect("four weights in range"), target());
+    }
+
+    #[test]
+    fn an_opaque_picture_has_no_transparent_pixels() {
+        assert_eq!(target().with_transparent(vec![false; 4]).expect("four pixels"), target());
+        let cut = target().with_transparent(vec![false, true, false, false]).expect("four pixels");
+        assert_eq!(cut.transparent(), Some(&[false, true, false, false][..]));
+        assert_eq!(cut.weights(), None);
+    }
+
+    #[test]
+    fn planes_of_another_size_and_weights_out_of_range_are_refused() {
+        for count in [0, 3, 5] {
+            let refusal = target().with_weights(vec![1; count]).expect_err("the count is wrong");
+            assert!(refusal.to_string().contains(&format!("2x2 px cannot have {count} weights")), "{refusal}");
+            let refusal = target().with_transparent(vec![true; count]).expect_err("the count is wrong");
+            assert!(refusal.to_string().contains(&format!("2x2 px cannot have {count} pixels")), "{refusal}");
+        }
+        for wrong in [0, WEIGHT_MAX + 1, 255] {
+            assert!(target().with_weights(vec![1, 1, wrong, 1]).is_err(), "{wrong}");
+        }
     }
 }

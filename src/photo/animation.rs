@@ -11,7 +11,6 @@ use std::io::{self, Write};
 use gif::{DisposalMethod, Frame, Repeat};
 use png::{BlendOp, DeflateCompression};
 
-use super::Photo;
 use super::metadata::Metadata;
 use super::palette::{COLOR_COUNT_MAX, nearest, palette_of};
 
@@ -201,10 +200,7 @@ impl<W: Write> GifEncoder<W> {
         let changed: Vec<[u8; 3]> = pixels.iter().flatten().copied().collect();
         let palette = match changed.len() {
             0 => Vec::new(),
-            count => {
-                let changed = Photo { width_px: count as u32, height_px: 1, pixels: changed };
-                palette_of(&changed, COLOR_COUNT_MAX - 1).map_err(io::Error::other)?
-            }
+            _ => palette_of(&changed, COLOR_COUNT_MAX - 1).map_err(io::Error::other)?,
         };
         let transparent = palette.len() as u8;
         let mut indices = HashMap::new();

@@ -1,35 +1,45 @@
-//! From what a decoder gives to opaque 8-bit sRGB: ICC profile, then alpha, then 8 bits with one rounding.
+//! From what a decoder gives to 8-bit sRGB: ICC profile, then alpha, then 8 bits with one rounding.
 //!
 //! A row at a time in 16 bits per channel, so that a 16-bit picture in a linear profile keeps its shadows.
 
-use image::{DynamicImage, GrayAlphaImage, ImageBuffer, Pixel, RgbImage};
+use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, Pixel, RgbImage, RgbaImage};
 
+use super::Background;
 use super::icc::Profile;
 
-/// The picture without its profile and its alpha; transparent pixels show `background`.
+/// The picture without its profile over `background`: as RGB, or, where transparency is kept and some pixel is not
+/// opaque, as RGBA with colours that are composited on black.
 ///
 /// A profile that cannot be used is left out, with a warning.
-pub(super) fn to_opaque_srgb(
+pub(super) fn to_srgb(
     image: DynamicImage,
     icc: Option<&[u8]>,
-    background: [u8; 3],
+    background: Background,
     warnings: &mut Vec<String>,
-) -> RgbImage {
+) -> DynamicImage {
     let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, image.color().has_color()));
     let profile = profile.unwrap_or_else(|reason| {
         warnings.push(format!("its ICC profile is ignored, so colours may be off: {reason}"));
         Profile::Srgb
     });
-    let rows = Rows { profile, background };
+    match background {
+        Background::Color(color) => Rows { profile, background: color }.over_background(image).into(),
+        Background::Transparent => {
+            let rows = Rows { profile, background: [0; 3] };
+            if has_transparency(&image) { rows.with_alpha(image).into() } else { rows.over_background(image).into() }
+        }
+    }
+}
+
+/// Whether some pixel is not opaque.
+fn has_transparency(image: &DynamicImage) -> bool {
     match image {
-        DynamicImage::ImageRgb8(image) if matches!(rows.profile, Profile::Srgb) => image,
-        DynamicImage::ImageLuma8(image) => rows.convert(&image, widen),
-        DynamicImage::ImageLumaA8(image) => rows.convert(&image, widen),
-        DynamicImage::ImageRgb8(image) => rows.convert(&image, widen),
-        DynamicImage::ImageRgba8(image) => rows.convert(&image, widen),
-        DynamicImage::ImageRgb32F(image) => rows.convert(&image, quantised),
-        DynamicImage::ImageRgba32F(image) => rows.convert(&image, quantised),
-        image => rows.convert(&image.into_rgba16(), |channel| channel),
+        DynamicImage::ImageLumaA8(image) => image.pixels().any(|pixel| pixel.0[1] != u8::MAX),
+        DynamicImage::ImageRgba8(image) => image.pixels().any(|pixel| pixel.0[3] != u8::MAX),
+        DynamicImage::ImageLumaA16(image) => image.pixels().any(|pixel| pixel.0[1] != u16::MAX),
+        DynamicImage::ImageRgba16(image) => image.pixels().any(|pixel| pixel.0[3] != u16::MAX),
+        DynamicImage::ImageRgba32F(image) => image.pixels().any(|pixel| quantised(pixel.0[3]) != u16::MAX),
+        image => image.color().has_alpha(),
     }
 }
 
@@ -55,6 +65,29 @@ pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> Gray
     GrayAlphaImage::from_raw(image.width(), image.height(), stencil).expect("every row has been converted")
 }
 
+/// The luma of a picture over black: weights of Rec. 709, of stored sRGB values. Grey stays as it is stored, whatever its
+/// profile, since somebody drew its values.
+///
+/// A profile that cannot be used is left out: it would hardly change the luma.
+pub(super) fn to_luma_over_black(image: DynamicImage, icc: Option<&[u8]>) -> GrayImage {
+    let icc = icc.filter(|_| image.color().has_color());
+    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, true)).unwrap_or(Profile::Srgb);
+    let image = image.into_rgba16();
+    let mut lumas = Vec::with_capacity(image.width() as usize * image.height() as usize);
+    let (mut row, mut scratch) = (Vec::new(), Vec::new());
+    for pixels in image.rows() {
+        row.clear();
+        row.extend(pixels.map(|pixel| pixel.0));
+        profile.apply(&mut row, &mut scratch);
+        lumas.extend(row.iter().map(|&[r, g, b, alpha]| {
+            let luma = (u64::from(r) * 2126 + u64::from(g) * 7152 + u64::from(b) * 722) * u64::from(alpha);
+            let one = 10_000 * 65_535 * 257;
+            ((luma + one / 2) / one) as u8
+        }));
+    }
+    GrayImage::from_raw(image.width(), image.height(), lumas).expect("every row has been converted")
+}
+
 /// An 8-bit channel in 16 bits: 0 stays 0, 255 becomes 65,535.
 fn widen(channel: u8) -> u16 {
     u16::from(channel) * 257
@@ -65,29 +98,64 @@ fn quantised(channel: f32) -> u16 {
     (channel * 65_535.0 + 0.5) as u16
 }
 
-/// How every row is brought to opaque 8-bit sRGB.
+/// How every row is brought to 8-bit sRGB over a background.
 struct Rows {
     profile: Profile,
     background: [u8; 3],
 }
 
 impl Rows {
-    fn convert<P: Pixel>(
+    /// The picture without its alpha.
+    fn over_background(&self, image: DynamicImage) -> RgbImage {
+        let (width_px, height_px) = (image.width(), image.height());
+        let over = |pixel| self.composite(pixel);
+        let opaque = match image {
+            DynamicImage::ImageRgb8(image) if matches!(self.profile, Profile::Srgb) => return image,
+            DynamicImage::ImageLuma8(image) => self.convert(&image, widen, over),
+            DynamicImage::ImageLumaA8(image) => self.convert(&image, widen, over),
+            DynamicImage::ImageRgb8(image) => self.convert(&image, widen, over),
+            DynamicImage::ImageRgba8(image) => self.convert(&image, widen, over),
+            DynamicImage::ImageRgb32F(image) => self.convert(&image, quantised, over),
+            DynamicImage::ImageRgba32F(image) => self.convert(&image, quantised, over),
+            image => self.convert(&image.into_rgba16(), |channel| channel, over),
+        };
+        RgbImage::from_raw(width_px, height_px, opaque).expect("every row has been converted")
+    }
+
+    /// The picture over the background, and its alpha beside that.
+    fn with_alpha(&self, image: DynamicImage) -> RgbaImage {
+        let (width_px, height_px) = (image.width(), image.height());
+        let beside = |pixel: [u16; 4]| {
+            let [r, g, b] = self.composite(pixel);
+            [r, g, b, ((u32::from(pixel[3]) + 128) / 257) as u8]
+        };
+        let cut = match image {
+            DynamicImage::ImageLumaA8(image) => self.convert(&image, widen, beside),
+            DynamicImage::ImageRgba8(image) => self.convert(&image, widen, beside),
+            DynamicImage::ImageRgba32F(image) => self.convert(&image, quantised, beside),
+            image => self.convert(&image.into_rgba16(), |channel| channel, beside),
+        };
+        RgbaImage::from_raw(width_px, height_px, cut).expect("every row has been converted")
+    }
+
+    /// The channels of every pixel, widened, brought to sRGB and then to 8 bits.
+    fn convert<P: Pixel, const CHANNELS: usize>(
         &self,
         image: &ImageBuffer<P, Vec<P::Subpixel>>,
         to_16_bits: impl Fn(P::Subpixel) -> u16,
-    ) -> RgbImage {
+        to_8_bits: impl Fn([u16; 4]) -> [u8; CHANNELS],
+    ) -> Vec<u8> {
         let (width_px, height_px) = image.dimensions();
-        let mut opaque = Vec::with_capacity(width_px as usize * height_px as usize * 3);
+        let mut converted = Vec::with_capacity(width_px as usize * height_px as usize * CHANNELS);
         let mut row = Vec::with_capacity(width_px as usize);
         let mut scratch = Vec::new();
         for pixels in image.rows() {
             row.clear();
             row.extend(pixels.map(|pixel| pixel.to_rgba().0.map(&to_16_bits)));
             self.profile.apply(&mut row, &mut scratch);
-            opaque.extend(row.iter().flat_map(|&pixel| self.composite(pixel)));
+            converted.extend(row.iter().flat_map(|&pixel| to_8_bits(pixel)));
         }
-        RgbImage::from_raw(width_px, height_px, opaque).expect("every row has been converted")
+        converted
     }
 
     /// One pixel over the background, rounded once to 8 bits: for 8-bit input `(c*a + b*(255-a) + 127) / 255`.

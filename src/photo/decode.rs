@@ -5,7 +5,7 @@ use std::io::{self, Cursor, Read};
 use std::path::Path;
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, RgbImage};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use sha2::{Digest, Sha256};
 
 use super::{Photo, color, jpeg_segments, resize};
@@ -24,11 +24,26 @@ const SIGNATURE_BYTES: u64 = 64;
 /// The formats that are read, for messages.
 const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP and GIF";
 
+/// What is behind a picture that is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Background {
+    /// This 8-bit sRGB colour, which shows through where the picture is transparent.
+    Color([u8; 3]),
+    /// Nothing: what is transparent stays so ([`Loaded::transparent`]).
+    Transparent,
+}
+
+impl Default for Background {
+    fn default() -> Self {
+        Self::Color([0; 3])
+    }
+}
+
 /// What is done to a picture while it is read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ReadOptions {
-    /// 8-bit sRGB colour that shows through where the picture is transparent.
-    pub background: [u8; 3],
+    /// What shows where the picture is transparent; black unless asked otherwise.
+    pub background: Background,
     /// Size in px, at least 1, that the longer side is reduced to; smaller pictures stay as they are, and with `None`
     /// all do.
     pub long_side_px: Option<u32>,
@@ -37,8 +52,14 @@ pub struct ReadOptions {
 /// A picture that was read, and what is worth knowing about its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loaded {
-    /// The picture: upright, in sRGB, opaque, fitted to size.
+    /// The picture: upright, in sRGB, fitted to size, over its background.
     pub photo: Photo,
+    /// Which pixels of `photo` are transparent, row by row: those of an alpha below 128 of 255. None if no pixel is, or if
+    /// the picture was read over a colour.
+    ///
+    /// These pixels are black. The others are over black as far as their alpha goes, and whatever colour the transparent
+    /// ones had is not in them.
+    pub transparent: Option<Vec<bool>>,
     /// Width in px of the upright picture before it was fitted.
     pub original_width_px: u32,
     /// Height in px of the upright picture before it was fitted.
@@ -52,7 +73,7 @@ pub struct Loaded {
 /// Reads the picture at `path`; its content, not its name, tells the format.
 ///
 /// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
-/// background, 8 bits, EXIF orientation, Lanczos3 to the size asked for. The bytes are the same on every machine,
+/// background (on black if that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The bytes are the same on every machine,
 /// but for an ICC profile that has tables and no matrix: there a processor's fused multiplications may round a channel
 /// by one.
 ///
@@ -64,11 +85,14 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     let mut warnings = Vec::new();
     let upright =
         decode(&bytes, format, options.background, &mut warnings).map_err(|reason| Error::input(path, reason))?;
-    let (original_width_px, original_height_px) = upright.dimensions();
+    let (original_width_px, original_height_px) = (upright.width(), upright.height());
     let sha256 = sha256_hex(&bytes);
     drop(bytes);
-    let photo = resize::fit(&upright, options.long_side_px);
-    Ok(Loaded { photo, original_width_px, original_height_px, sha256, warnings })
+    let (photo, transparent) = match upright {
+        DynamicImage::ImageRgba8(cut) => resize::fit_cut(&cut, options.long_side_px),
+        opaque => (resize::fit(&opaque.into_rgb8(), options.long_side_px), None),
+    };
+    Ok(Loaded { photo, transparent, original_width_px, original_height_px, sha256, warnings })
 }
 
 /// Whether the file at `path` begins like a picture that can be read.
@@ -84,7 +108,7 @@ pub(super) fn is_picture(path: &Path) -> Result<bool> {
 }
 
 /// The bytes of the file at `path`, once its first bytes have shown that it is a picture.
-fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
+pub(super) fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
     let unreadable = |error: io::Error| Error::input(path, why_unreadable(&error));
     let mut file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
@@ -118,18 +142,17 @@ pub(super) fn known_format(bytes: &[u8]) -> Option<ImageFormat> {
     image::guess_format(bytes).ok().filter(|format| matches!(format, Png | Jpeg | WebP | Tiff | Bmp | Gif))
 }
 
-/// The upright 8-bit sRGB picture in `bytes`, or a sentence that says why there is none.
+/// The upright 8-bit sRGB picture in `bytes`, as [`color::to_srgb`] makes it, or a sentence that says why there is none.
 fn decode(
     bytes: &[u8],
     format: ImageFormat,
-    background: [u8; 3],
+    background: Background,
     warnings: &mut Vec<String>,
-) -> Result<RgbImage, String> {
+) -> Result<DynamicImage, String> {
     let raw = decode_raw(bytes, format)?;
-    let mut image =
-        DynamicImage::ImageRgb8(color::to_opaque_srgb(raw.image, raw.profile.as_deref(), background, warnings));
+    let mut image = color::to_srgb(raw.image, raw.profile.as_deref(), background, warnings);
     image.apply_orientation(raw.orientation);
-    Ok(image.into_rgb8())
+    Ok(image)
 }
 
 /// What a decoder gives, and what is left to do to it.

@@ -43,12 +43,20 @@ pub fn encode(format: Format, photo: &Photo, metadata: &Metadata) -> Result<Vec<
 /// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]) or the photo has no pixels.
 pub fn encode_png(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
     metadata::check(metadata)?;
-    png_bytes(photo, metadata).map_err(|error| Error::Usage(format!("the picture cannot be written as PNG: {error}")))
+    let (samples, size_px) = (photo.pixels.as_flattened(), (photo.width_px, photo.height_px));
+    png_bytes(samples, size_px, png::ColorType::Rgb, metadata)
+        .map_err(|error| Error::Usage(format!("the picture cannot be written as PNG: {error}")))
 }
 
-fn png_bytes(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>, png::EncodingError> {
+/// The PNG of these samples, `color` of them a pixel.
+fn png_bytes(
+    samples: &[u8],
+    size_px: (u32, u32),
+    color: png::ColorType,
+    metadata: &Metadata,
+) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = png_encoder(&mut bytes, (photo.width_px, photo.height_px), png::ColorType::Rgb);
+    let mut encoder = png_encoder(&mut bytes, size_px, color);
     // The two kinds of chunk are written one after the other: with one kind the order stays.
     let ascii = metadata.iter().all(|(_, text)| text.is_ascii());
     for (keyword, text) in metadata.iter().cloned() {
@@ -59,26 +67,25 @@ fn png_bytes(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>, png::Encodin
         }
     }
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(photo.pixels.as_flattened())?;
+    writer.write_image_data(samples)?;
     writer.finish()?;
     Ok(bytes)
 }
 
-/// Pixels with alpha, not premultiplied, as an 8-bit RGBA PNG with an sRGB chunk.
+/// Pixels with alpha, not premultiplied, as an 8-bit RGBA PNG with an sRGB chunk and the metadata as text chunks.
 ///
 /// # Errors
-/// [`Error::Usage`] if there are not `width_px * height_px` pixels, or none.
-pub fn encode_png_with_alpha(width_px: u32, height_px: u32, pixels: &[[u8; 4]]) -> Result<Vec<u8>> {
-    let write = || {
-        let mut bytes = Vec::new();
-        let mut writer = png_encoder(&mut bytes, (width_px, height_px), png::ColorType::Rgba).write_header()?;
-        writer.write_image_data(pixels.as_flattened())?;
-        writer.finish()?;
-        Ok(bytes)
-    };
-    write().map_err(|error: png::EncodingError| {
-        Error::Usage(format!("the picture cannot be written as PNG with alpha: {error}"))
-    })
+/// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]), or if there are not `width_px * height_px` pixels, or
+/// none.
+pub fn encode_png_with_alpha(
+    width_px: u32,
+    height_px: u32,
+    pixels: &[[u8; 4]],
+    metadata: &Metadata,
+) -> Result<Vec<u8>> {
+    metadata::check(metadata)?;
+    png_bytes(pixels.as_flattened(), (width_px, height_px), png::ColorType::Rgba, metadata)
+        .map_err(|error| Error::Usage(format!("the picture cannot be written as PNG with alpha: {error}")))
 }
 
 /// An encoder with the settings of every PNG that is written.

@@ -15,11 +15,12 @@ mod palette;
 mod resize;
 mod stencil;
 mod webp;
+mod weights;
 pub(crate) mod xml;
 
 pub use animation::{ApngEncoder, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
 pub(crate) use decode::why_unreadable;
-pub use decode::{Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
+pub use decode::{Background, Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
 pub use encode::{Format, encode, encode_jpeg, encode_png, encode_png_with_alpha, encode_webp};
 pub(crate) use metadata::png_metadata;
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
@@ -27,6 +28,7 @@ pub use palette::{COLOR_COUNT_MAX, palette_of, read_palette, reduce};
 pub use resize::fitted;
 pub use stencil::{Stencil, decode_stencil, is_picture};
 pub use webp::WEBP_SIDE_MAX_PX;
+pub use weights::read_weights;
 
 /// A picture in memory: 8-bit sRGB, no alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]

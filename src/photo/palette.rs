@@ -22,16 +22,16 @@ pub const COLOR_COUNT_MAX: usize = 256;
 /// Most bytes of a palette file in text form.
 const TEXT_BYTES_MAX: u64 = 1 << 20;
 
-/// The `color_count` colours (1 to [`COLOR_COUNT_MAX`]) that stand best for those of `photo`, in rising order: Wu's
-/// quantiser, or the photo's own colours if it has no more than that.
+/// The `color_count` colours (1 to [`COLOR_COUNT_MAX`]) that stand best for those of `pixels`, in rising order: Wu's
+/// quantiser, or their own colours if there are no more than that.
 ///
 /// # Errors
-/// [`Error::Usage`] if the photo has no pixels.
-pub fn palette_of(photo: &Photo, color_count: usize) -> Result<Vec<[u8; 3]>> {
+/// [`Error::Usage`] if there are no pixels.
+pub fn palette_of(pixels: &[[u8; 3]], color_count: usize) -> Result<Vec<[u8; 3]>> {
     let size = PaletteSize::from_usize_clamped(color_count);
-    let mut palette = distinct_colors(&photo.pixels, size.as_usize()).map_or_else(
+    let mut palette = distinct_colors(pixels, size.as_usize()).map_or_else(
         || {
-            let colors: &[Srgb<u8>] = from_array_slice(&photo.pixels);
+            let colors: &[Srgb<u8>] = from_array_slice(pixels);
             let counted = WuU8x3::run_slice(colors, BinnerU8x3::rgb())
                 .map_err(|error| Error::Usage(format!("the picture cannot be reduced to few colours: {error}")))?;
             Ok(counted.palette(size).into_vec().into_iter().map(<[u8; 3]>::from).collect())
@@ -162,7 +162,7 @@ mod tests {
     fn a_picture_is_reduced_to_as_many_colours_as_asked_for_and_each_is_the_nearest() {
         for count in [1, 2, 60, 256] {
             let mut photo = gradient();
-            let palette = palette_of(&photo, count).expect("there are pixels");
+            let palette = palette_of(&photo.pixels, count).expect("there are pixels");
             assert!(palette.len() <= count && palette.len() * 10 >= count * 9, "{} for {count}", palette.len());
             let before = photo.pixels.clone();
             reduce(&mut photo, &palette);
@@ -177,7 +177,7 @@ mod tests {
     fn a_picture_of_few_colours_stays_as_it_is() {
         let pixels = vec![[1, 2, 3], [1, 2, 4], [200, 2, 3], [1, 2, 3]];
         let mut photo = Photo { width_px: 2, height_px: 2, pixels: pixels.clone() };
-        let palette = palette_of(&photo, 3).expect("there are pixels");
+        let palette = palette_of(&photo.pixels, 3).expect("there are pixels");
         assert_eq!(palette, [[1, 2, 3], [1, 2, 4], [200, 2, 3]]);
         reduce(&mut photo, &palette);
         assert_eq!(photo.pixels, pixels);

@@ -9,7 +9,7 @@ use super::{base64, push};
 use crate::error::Result;
 use crate::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE, Texel};
 use crate::model::{Blend, Fly, Mask, Population};
-use crate::photo;
+use crate::photo::{self, Metadata};
 
 /// Path data of the whole mask.
 const SQUARE: &str = "M-128-128h256v256h-256z";
@@ -100,7 +100,7 @@ fn push_cut_out(svg: &mut String, layer: usize, shape: &str, shade: &str) {
 
 /// A picture of texels with hard edges: `pixelated` is the word of browsers, the attribute that of SVG 1.1.
 fn picture(texels: &[[u8; 4]]) -> Result<String> {
-    let png = photo::encode_png_with_alpha(MASK_SIDE as u32, MASK_SIDE as u32, texels)?;
+    let png = photo::encode_png_with_alpha(MASK_SIDE as u32, MASK_SIDE as u32, texels, &Metadata::new())?;
     Ok(format!(
         "<image x=\"-128\" y=\"-128\" width=\"256\" height=\"256\" image-rendering=\"optimizeSpeed\" \
          style=\"image-rendering:pixelated\" xlink:href=\"data:image/png;base64,{}\"/>",

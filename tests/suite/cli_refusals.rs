@@ -115,8 +115,8 @@ fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
         ("-o - -o -", 2, "named twice"),
         ("-o a.png --save-target a.png", 2, "named twice"),
         ("-o a.png --save-target a.jpg", 2, "a.jpg"),
-        ("-o photo.png --force", 2, "is the input"),
-        ("-o a.png --save-target ./photo.png --force", 2, "is the input"),
+        ("-o photo.png --force", 2, "is an input"),
+        ("-o a.png --save-target ./photo.png --force", 2, "is an input"),
         ("-o - --json", 2, "stdout"),
         ("-o a.npz -o a.csv -o a.json --output-size 9", 2, "--output-size 9: a population has no size"),
         ("-o a.webp --output-size 16384", 2, "a.webp: a WebP has at most 16383 px a side"),
@@ -223,6 +223,14 @@ fn a_row_that_cannot_be_printed_is_a_failure_with_a_sentence() {
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(stderr.starts_with("smalti: stdout: cannot be written") && stderr.lines().count() == 1, "{stderr:?}");
+}
+
+#[test]
+fn a_map_of_weights_is_refused_where_the_scheme_has_no_use_for_it() {
+    let workshop = Workshop::new();
+    let words = "--weight: the paper's scheme weighs all pixels alike; use --scheme cells";
+    refused(&workshop, "evolve photo.png -o a.png --weight photo.png", 2, words);
+    refused(&workshop, "evolve photo.png -o a.png --scheme paper --weight missing.png", 2, words);
 }
 
 #[test]

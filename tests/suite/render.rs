@@ -266,7 +266,7 @@ fn values_and_outputs_that_make_no_sense_are_refused() {
         ("-o a.png --validate", 2, "--validate"),
         ("-o a.png -q -v", 2, "--verbose"),
         ("-o - --json", 2, "stdout"),
-        ("-o flies.npz --force", 2, "is the input"),
+        ("-o flies.npz --force", 2, "is an input"),
         ("-o a.png -o ./a.png", 2, "named twice"),
         ("-o nowhere/a.png", 1, "nowhere/a.png"),
     ] {

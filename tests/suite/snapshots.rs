@@ -147,7 +147,7 @@ fn a_folder_that_is_the_input_or_another_output_is_refused() {
         ("-o same.png --save-run same.png", "same.png is named twice"),
         ("-o a.png --save-target t.png --save-run ./t.png", "./t.png is named twice"),
         ("-o a.png --curve c.svg --save-run c.svg", "c.svg is named twice"),
-        ("-o a.png --save-run ./photo.png", "./photo.png is the input"),
+        ("-o a.png --save-run ./photo.png", "./photo.png is an input"),
     ] {
         refused(&workshop, &format!("evolve photo.png {rest}"), 2, words);
     }

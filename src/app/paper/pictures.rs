@@ -33,7 +33,7 @@ impl Picture {
         let index = index.ok_or_else(|| Error::Internal(format!("no picture is kept at {side_px} px")))?;
         let mut photo = self.photos[index].clone();
         if let Some(count) = color_count {
-            let palette = photo::palette_of(&photo, count)?;
+            let palette = photo::palette_of(&photo.pixels, count)?;
             photo::reduce(&mut photo, &palette);
         }
         Target::new(photo.width_px, photo.height_px, photo.pixels).map(Arc::new)

@@ -142,8 +142,8 @@ fn a_webp_loses_no_pixel_whatever_its_size() {
 #[test]
 fn pixels_with_alpha_come_back_as_they_were() {
     let pixels = super::noise(5 * 7 * 4).as_chunks::<4>().0.to_vec();
-    let png = smalti::photo::encode_png_with_alpha(5, 7, &pixels).expect("it can be encoded");
+    let png = smalti::photo::encode_png_with_alpha(5, 7, &pixels, &vec![]).expect("it can be encoded");
     let decoded = image::load_from_memory(&png).expect("it can be decoded").to_rgba8();
     assert_eq!((decoded.dimensions(), decoded.as_raw().as_slice()), ((5, 7), pixels.as_flattened()));
-    assert!(smalti::photo::encode_png_with_alpha(5, 6, &pixels).is_err());
+    assert!(smalti::photo::encode_png_with_alpha(5, 6, &pixels, &vec![]).is_err());
 }

@@ -5,6 +5,7 @@ mod encoding;
 mod openraster;
 mod outputs;
 mod photos;
+mod planes;
 mod tables;
 mod vector;
 

@@ -4,11 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use smalti::Error;
-use smalti::photo::{Photo, ReadOptions, encode_png, read};
+use smalti::photo::{Background, Photo, ReadOptions, encode_png, read};
 
 use super::{load, load_with, noise, photo_path, short_hash};
 
-const GREEN: ReadOptions = ReadOptions { background: [10, 200, 30], long_side_px: None };
+const GREEN: ReadOptions = ReadOptions { background: Background::Color(GREEN_COLOR), long_side_px: None };
+const GREEN_COLOR: [u8; 3] = [10, 200, 30];
 
 /// Name, width, height, and hash of the pixels over [`GREEN`].
 const DECODED: [(&str, u32, u32, &str); 20] = [
@@ -123,7 +124,7 @@ fn transparency_shows_the_background() {
         let (x, y) = (index as u32 % opaque.width_px, index as u32 / opaque.width_px);
         let alpha = (x * 7 + y * 3) % 256;
         let expected: [u8; 3] = std::array::from_fn(|i| {
-            ((u32::from(front[i]) * alpha + u32::from(GREEN.background[i]) * (255 - alpha) + 127) / 255) as u8
+            ((u32::from(front[i]) * alpha + u32::from(GREEN_COLOR[i]) * (255 - alpha) + 127) / 255) as u8
         });
         assert_eq!(over, expected, "({x}, {y})");
     }

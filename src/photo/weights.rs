@@ -1,0 +1,62 @@
+//! Maps that tell where a picture matters.
+
+use std::path::Path;
+
+use image::DynamicImage;
+
+use super::decode::{decode_raw, read_picture_file};
+use super::{color, resize};
+use crate::error::{Error, Result};
+
+/// The luma of the map at `path` at the size of the picture that it is for, row by row from the top; 0 is where the
+/// picture matters least and 255 where it matters most.
+///
+/// Any picture that is read can be a map: grey is taken as it is stored, colours by their luma, what is transparent as
+/// black; EXIF orientation is applied. The bytes are the same on every machine.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read, as for [`super::read`], or if its proportions are not those of the
+/// picture, to a pixel at the smaller of both sizes.
+pub fn read_weights(path: &Path, width_px: u32, height_px: u32) -> Result<Vec<u8>> {
+    let (format, bytes) = read_picture_file(path)?;
+    let raw = decode_raw(&bytes, format).map_err(|reason| Error::input(path, reason))?;
+    drop(bytes);
+    let mut map = DynamicImage::ImageLuma8(color::to_luma_over_black(raw.image, raw.profile.as_deref()));
+    map.apply_orientation(raw.orientation);
+    let map = map.into_luma8();
+    let size_px = (width_px, height_px);
+    if !has_proportions_of(map.dimensions(), size_px) {
+        let (map_width_px, map_height_px) = map.dimensions();
+        let reason = format!(
+            "a map of {map_width_px}x{map_height_px} px does not fit a picture of {width_px}x{height_px} px; give it the \
+             picture's proportions"
+        );
+        return Err(Error::input(path, reason));
+    }
+    Ok(resize::fit_luma(&map, size_px))
+}
+
+/// Whether two sizes in px have the same proportions: the larger, reduced to the longer side of the smaller, is like the
+/// smaller to a pixel.
+fn has_proportions_of(one: (u32, u32), other: (u32, u32)) -> bool {
+    let long_side_px = |(width_px, height_px): (u32, u32)| width_px.max(height_px);
+    let (small, large) = if long_side_px(one) <= long_side_px(other) { (one, other) } else { (other, one) };
+    let (width_px, height_px) = resize::fitted_size(large, Some(long_side_px(small)));
+    width_px.abs_diff(small.0) <= 1 && height_px.abs_diff(small.1) <= 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::has_proportions_of;
+
+    #[test]
+    fn proportions_are_compared_to_a_pixel_of_the_smaller_size() {
+        let picture = (1000, 625);
+        for like in [(1000, 625), (1000, 624), (100, 63), (100, 62), (512, 320), (8000, 5000), (4001, 2500), (8, 5)] {
+            assert!(has_proportions_of(like, picture) && has_proportions_of(picture, like), "{like:?}");
+        }
+        for unlike in [(625, 1000), (1000, 627), (100, 60), (100, 65), (8000, 5020), (64, 64)] {
+            assert!(!has_proportions_of(unlike, picture) && !has_proportions_of(picture, unlike), "{unlike:?}");
+        }
+    }
+}
