@@ -4,6 +4,7 @@
 //! parallel over blocks on the current rayon pool; sums of integers do not depend on the order, so neither does any
 //! result. Twin: `gpu/` with `glsl/`.
 
+pub mod cells;
 mod evaluate;
 mod lane_evaluation;
 mod mosaic;

@@ -4,10 +4,11 @@
 //! or a clock.
 
 pub mod blocks;
+pub mod cells;
 pub mod evaluation;
 pub mod fly;
-pub mod guide;
 pub mod grout;
+pub mod guide;
 pub mod lane;
 pub mod mask;
 pub mod mosaic;
@@ -22,8 +23,8 @@ pub mod translucency;
 
 pub use evaluation::{Change, Evaluation, Evaluator, Layers, NO_FLY};
 pub use fly::Fly;
-pub use guide::{Guide, GuideSample};
 pub use grout::Grout;
+pub use guide::{Guide, GuideSample};
 pub use lane::{Lane, Scene};
 pub use mask::{Blend, Mask, MaskSet};
 pub use mosaic::{Mosaic, Patch};

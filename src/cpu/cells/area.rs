@@ -1,0 +1,323 @@
+//! The blocks of one cell while a task works on it, and what a child would do to their pixels.
+
+use multiversion::multiversion;
+
+use super::block::{Block, PIXELS, SIDE};
+use crate::model::cells::color::median;
+use crate::model::cells::footprint::Footprint;
+use crate::model::cells::pixel::INSIDE;
+
+/// Eight pixels of a row.
+pub type Lanes = [i32; SIDE];
+
+/// The blocks of a cell, row by row.
+pub struct Area<'a> {
+    blocks: Vec<&'a mut Block>,
+    /// Blocks along the width.
+    columns: usize,
+    /// First column and row of blocks in the picture.
+    first: (i32, i32),
+}
+
+/// A child as far as its pixels go.
+#[derive(Clone, Copy, Debug)]
+pub struct Child<'a> {
+    /// Where it is.
+    pub footprint: &'a Footprint,
+    /// How deep.
+    pub z: i32,
+    /// Its place in the population, which is its victim's.
+    pub fly: u32,
+    /// Cost of each pixel that it covers.
+    pub overlap: i32,
+}
+
+/// The pixels where a child would show.
+#[derive(Debug)]
+pub struct Shown {
+    targets: Vec<u32>,
+    channel: Vec<u8>,
+    /// What its other pixels, and what shows now, add to the change of the objective.
+    rest: i64,
+}
+
+impl Default for Shown {
+    fn default() -> Self {
+        Self { targets: Vec::with_capacity(4096), channel: Vec::with_capacity(4096), rest: 0 }
+    }
+}
+
+/// A part of a block's rows inside a footprint's box.
+struct Rows {
+    first: usize,
+    last: usize,
+    /// Tile coordinates of the first pixel of the first row.
+    u: i32,
+    v: i32,
+}
+
+impl<'a> Area<'a> {
+    /// The blocks of a cell whose first block is `first` in the picture.
+    pub fn new(blocks: Vec<&'a mut Block>, columns: usize, first: (i32, i32)) -> Self {
+        Self { blocks, columns, first }
+    }
+
+    /// The block and the pixel in it at a place in the picture.
+    #[inline(always)]
+    pub fn place(&self, x: i32, y: i32) -> (usize, usize) {
+        let (column, row) = ((x >> 3) - self.first.0, (y >> 3) - self.first.1);
+        (row as usize * self.columns + column as usize, ((y & 7) * 8 + (x & 7)) as usize)
+    }
+
+    /// A block by its place.
+    #[inline(always)]
+    pub fn block(&self, place: usize) -> &Block {
+        self.blocks[place]
+    }
+
+    /// Calls `visit` for the rows of each block that the box touches.
+    #[inline(always)]
+    fn visit(&self, footprint: &Footprint, mut visit: impl FnMut(&Block, &Rows)) {
+        let (first_x, first_y) = (footprint.x0 >> 3, footprint.y0 >> 3);
+        for row in first_y..=footprint.y1 >> 3 {
+            let top = (row * 8).max(footprint.y0);
+            let bottom = (row * 8 + 7).min(footprint.y1);
+            let start = (row - self.first.1) as usize * self.columns;
+            for column in first_x..=footprint.x1 >> 3 {
+                let (u, v) = footprint.coordinates(column * 8, top);
+                let block = &*self.blocks[start + (column - self.first.0) as usize];
+                let rows = Rows { first: (top & 7) as usize, last: (bottom & 7) as usize, u, v };
+                visit(block, &rows);
+            }
+        }
+    }
+
+    /// Whether some pixel's stack in the blocks of the box is full.
+    pub fn is_full(&self, footprint: &Footprint) -> bool {
+        let mut is_full = false;
+        self.visit(footprint, |block, _| is_full |= block.full > 0);
+        is_full
+    }
+
+    /// Calls `visit` for every pixel that one of two footprints covers, with its block, its place in it, and whether each of the
+    /// two covers it.
+    #[inline(always)]
+    pub fn exchange(
+        &mut self,
+        one: &Footprint,
+        other: &Footprint,
+        mut visit: impl FnMut(&mut Block, usize, [bool; 2]),
+    ) {
+        let is_apart = one.x1 < other.x0 || other.x1 < one.x0 || one.y1 < other.y0 || other.y1 < one.y0;
+        if one.is_empty() || other.is_empty() || is_apart {
+            self.exchange_in(one, (one, &Footprint::EMPTY), &mut visit);
+            self.exchange_in(other, (&Footprint::EMPTY, other), &mut visit);
+        } else {
+            let boxed = Footprint {
+                x0: one.x0.min(other.x0),
+                y0: one.y0.min(other.y0),
+                x1: one.x1.max(other.x1),
+                y1: one.y1.max(other.y1),
+                ..*one
+            };
+            self.exchange_in(&boxed, (one, other), &mut visit);
+        }
+    }
+
+    #[inline(always)]
+    fn exchange_in(
+        &mut self,
+        boxed: &Footprint,
+        (one, other): (&Footprint, &Footprint),
+        visit: &mut impl FnMut(&mut Block, usize, [bool; 2]),
+    ) {
+        if boxed.is_empty() {
+            return;
+        }
+        let columns = (boxed.x0 >> 3)..=(boxed.x1 >> 3);
+        for row in boxed.y0 >> 3..=boxed.y1 >> 3 {
+            let (top, bottom) = ((row * 8).max(boxed.y0), (row * 8 + 7).min(boxed.y1));
+            let start = (row - self.first.1) as usize * self.columns;
+            for column in columns.clone() {
+                let block = &mut *self.blocks[start + (column - self.first.0) as usize];
+                for y in top..=bottom {
+                    let rows = [row_bits(block, one, (column, y)), row_bits(block, other, (column, y))];
+                    let mut bits = rows[0] | rows[1];
+                    while bits != 0 {
+                        let lane = bits.trailing_zeros();
+                        let covers = [rows[0] >> lane & 1 != 0, rows[1] >> lane & 1 != 0];
+                        visit(block, (y & 7) as usize * SIDE + lane as usize, covers);
+                        bits &= bits - 1;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Which of the eight pixels of a block's row the footprint covers, as bits.
+#[inline(always)]
+fn row_bits(block: &Block, f: &Footprint, (column, y): (i32, i32)) -> u32 {
+    if column < f.x0 >> 3 || column > f.x1 >> 3 || y < f.y0 || y > f.y1 {
+        return 0;
+    }
+    let (u, v) = f.coordinates(column * 8, y);
+    let out = outside(u, v, f);
+    let target = row_of(&block.target, (y & 7) as usize);
+    let mut bits = 0;
+    for lane in 0..SIDE {
+        bits |= u32::from((out[lane] >= 0) & (target[lane] & INSIDE != 0)) << lane;
+    }
+    bits
+}
+
+/// Negative where a lane's pixel lies outside the tile.
+#[inline(always)]
+fn outside(u: i32, v: i32, f: &Footprint) -> Lanes {
+    let mut out = [0; SIDE];
+    for (lane, out) in (0..).zip(&mut out) {
+        let (u, v) = (u.wrapping_add(f.cos.wrapping_mul(lane)), v.wrapping_sub(f.sin.wrapping_mul(lane)));
+        *out = u | (f.u_end - 1).wrapping_sub(u) | v | (f.v_end - 1).wrapping_sub(v);
+    }
+    out
+}
+
+/// The eight values of a row.
+#[inline(always)]
+fn row_of<T: Copy>(plane: &[T; PIXELS], row: usize) -> &[T; SIDE] {
+    plane[row * SIDE..row * SIDE + SIDE].first_chunk().expect("a row has eight pixels")
+}
+
+/// Of each pixel of a row, whether the child covers it (all ones), whether it would show there, and the error of what
+/// shows without its victim.
+#[inline(always)]
+fn compare(block: &Block, row: usize, (u, v): (i32, i32), child: &Child<'_>) -> (Lanes, Lanes, Lanes) {
+    let out = outside(u, v, child.footprint);
+    let (top, under) = (row_of(&block.top.fly, row), row_of(&block.under.fly, row));
+    let (top_z, under_z) = (row_of(&block.top.z, row), row_of(&block.under.z, row));
+    let (top_error, under_error) = (row_of(&block.top.error, row), row_of(&block.under.error, row));
+    let (mut covers, mut shows, mut errors) = ([0; SIDE], [0; SIDE], [0; SIDE]);
+    // Signs and masks instead of comparisons, which would not stay in a vector. All numbers are below 2^31, and `NO_FLY`
+    // is never asked for where it would matter: the background's depth alone decides.
+    for lane in 0..SIDE {
+        let apart = (top[lane] ^ child.fly) as i32;
+        let is_other = (apart | apart.wrapping_neg()) >> 31;
+        let choose = |one: i32, other: i32| (one & is_other) | (other & !is_other);
+        let z = choose(top_z[lane], under_z[lane]);
+        let fly = choose(top[lane] as i32, under[lane] as i32);
+        let is_lower = (child.fly as i32).wrapping_sub(fly) >> 31;
+        let is_front = (child.z - z + is_lower) >> 31;
+        covers[lane] = !((out[lane] | z) >> 31);
+        shows[lane] = is_front & !(out[lane] >> 31);
+        errors[lane] = choose(top_error[lane], under_error[lane]);
+    }
+    (covers, shows, errors)
+}
+
+/// The change of the objective when a child of this colour comes where its victim has gone, without the victim's part.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
+pub fn change(area: &Area<'_>, child: &Child<'_>, color: u32) -> i64 {
+    let mut sums = [0_i32; SIDE];
+    let f = *child.footprint;
+    area.visit(child.footprint, |block, rows| {
+        let (mut u, mut v) = (rows.u, rows.v);
+        for row in rows.first..=rows.last {
+            let (covers, shows, errors) = compare(block, row, (u, v), child);
+            let target = row_of(&block.target, row);
+            for lane in 0..SIDE {
+                let channel = |shift: u32| ((target[lane] >> shift & 255) as i32 - (color >> shift & 255) as i32).abs();
+                let error = channel(0) + channel(8) + channel(16);
+                sums[lane] += ((error - errors[lane]) & shows[lane]) + (child.overlap & covers[lane]);
+            }
+            u = u.wrapping_add(f.sin);
+            v = v.wrapping_add(f.cos);
+        }
+    });
+    sums.iter().map(|&sum| i64::from(sum)).sum()
+}
+
+impl Shown {
+    /// Collects the pixels where a child would show.
+    pub fn collect(&mut self, area: &Area<'_>, child: &Child<'_>) {
+        collect(self, area, child);
+    }
+
+    /// Number of pixels where the child would show.
+    pub fn count(&self) -> usize {
+        self.targets.len()
+    }
+
+    /// The packed colour of the medians of the target's channels.
+    pub fn median(&mut self) -> u32 {
+        medians(self)
+    }
+
+    /// The sums of the target's channels.
+    pub fn sums(&self) -> [u32; 3] {
+        let mut sums = [0; 3];
+        for &target in &self.targets {
+            sums.iter_mut().zip(target.to_le_bytes()).for_each(|(sum, channel)| *sum += u32::from(channel));
+        }
+        sums
+    }
+
+    /// As [`change`], of the child that was collected.
+    pub fn change(&self, color: u32) -> i64 {
+        self.rest + errors(&self.targets, color)
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
+fn collect(shown: &mut Shown, area: &Area<'_>, child: &Child<'_>) {
+    let boxed = child.footprint;
+    let room = ((boxed.x1 - boxed.x0 + 1) * (boxed.y1 - boxed.y0 + 1)) as usize + SIDE;
+    if shown.targets.len() < room {
+        shown.targets.resize(room, 0);
+    } else {
+        shown.targets.truncate(room);
+    }
+    let targets = &mut shown.targets;
+    let mut count = 0;
+    let mut sums = [0_i32; SIDE];
+    let f = *child.footprint;
+    area.visit(child.footprint, |block, rows| {
+        let (mut u, mut v) = (rows.u, rows.v);
+        for row in rows.first..=rows.last {
+            let (covers, shows, errors) = compare(block, row, (u, v), child);
+            let target = row_of(&block.target, row);
+            let places = &mut targets[count..count + SIDE];
+            let mut filled = 0;
+            for lane in 0..SIDE {
+                sums[lane] += (child.overlap & covers[lane]) - (errors[lane] & shows[lane]);
+                places[filled] = target[lane];
+                filled += (shows[lane] & 1) as usize;
+            }
+            count += filled;
+            u = u.wrapping_add(f.sin);
+            v = v.wrapping_add(f.cos);
+        }
+    });
+    targets.truncate(count);
+    shown.rest = sums.iter().map(|&sum| i64::from(sum)).sum();
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
+fn medians(shown: &mut Shown) -> u32 {
+    let mut color = 0;
+    for shift in [0, 8, 16] {
+        shown.channel.clear();
+        shown.channel.extend(shown.targets.iter().map(|target| (target >> shift) as u8));
+        color |= u32::from(median(&shown.channel)) << shift;
+    }
+    color
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
+fn errors(targets: &[u32], color: u32) -> i64 {
+    let mut sum = 0_i32;
+    for &target in targets {
+        let channel = |shift: u32| ((target >> shift & 255) as i32 - (color >> shift & 255) as i32).abs();
+        sum += channel(0) + channel(8) + channel(16);
+    }
+    i64::from(sum)
+}

@@ -1,0 +1,444 @@
+//! The steady-state loop of one cell in one round: selection, mutation, evaluation, acceptance, removal.
+
+use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
+
+use super::area::{self, Area, Child, Shown};
+use super::block::Entry;
+use multiversion::multiversion;
+
+use crate::model::cells::color::mean;
+use crate::model::cells::footprint::Footprint;
+use crate::model::cells::operators::{self, Setting, slot};
+use crate::model::cells::pixel::{STACK_DEPTH, difference};
+use crate::model::cells::random::{Chain, below};
+use crate::model::cells::rules::{Acceptance, BirthKind, ColorSource, STEP_FIRST, grown, shrunk};
+use crate::model::cells::{Course, Grid, NO_CELL};
+use crate::model::tile::{pack, unpack};
+use crate::model::{Fly, NO_FLY};
+
+/// What all cells of a round share.
+pub struct Shared<'a> {
+    pub course: &'a Course,
+    pub grid: &'a Grid,
+    /// The cell of each fly in this round, or [`NO_CELL`] if it is frozen.
+    pub owners: &'a [u32],
+    /// Marginal fitness. That of a cell's own flies is written by the cell alone; to that of frozen flies all only add.
+    pub fitness: &'a [AtomicI64],
+    /// Depths; frozen ones do not change.
+    pub depths: &'a [AtomicU32],
+}
+
+/// A fly of the cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Member {
+    pub index: u32,
+    pub fly: Fly,
+    /// Step size, u16.16.
+    pub step: u32,
+}
+
+/// What a cell did in a round.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Done {
+    pub evals: u64,
+    pub births: u64,
+    pub accepted: u64,
+    /// Change of the objective.
+    pub change: i64,
+}
+
+/// A child that was evaluated.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    /// Place of its victim among the members.
+    victim: usize,
+    fly: Fly,
+    footprint: Footprint,
+    is_birth: bool,
+    change: i64,
+}
+
+/// One cell at work.
+pub struct Cell<'a> {
+    pub shared: &'a Shared<'a>,
+    pub number: u32,
+    pub area: Area<'a>,
+    pub members: Vec<Member>,
+    pub shown: Shown,
+    pub done: Done,
+}
+
+impl Cell<'_> {
+    /// Makes all steps of the round, then removes the flies that do not help.
+    pub fn run(&mut self, chain: Chain) {
+        let steps = self.members.len() as u32 * self.shared.course.rules.steps_per_fly;
+        for step in 0..steps {
+            self.step(chain.then(step));
+        }
+        for place in 0..self.members.len() {
+            self.remove_useless(place);
+        }
+    }
+
+    /// Puts a fly where an absent one was, if there is room.
+    pub fn place(&mut self, place: usize, fly: &Fly) {
+        let footprint = Footprint::of(fly, (self.shared.grid.width_px, self.shared.grid.height_px));
+        let child = Candidate { victim: place, fly: *fly, footprint, is_birth: true, change: 0 };
+        if self.has_room(&child) {
+            self.replace(&child);
+        }
+    }
+
+    fn fitness(&self, place: usize) -> i64 {
+        self.shared.fitness[self.members[place].index as usize].load(Ordering::Relaxed)
+    }
+
+    fn step(&mut self, chain: Chain) {
+        let place = chain.below(0, self.members.len() as u32) as usize;
+        let fitness = self.fitness(place);
+        let mut best: Option<Candidate> = None;
+        let mut was_changed = false;
+        for candidate in 1..=self.shared.course.rules.candidates {
+            let draws = chain.then(candidate);
+            let Some(child) = self.candidate(place, fitness, draws) else { continue };
+            self.done.evals += 1;
+            was_changed |= !child.is_birth;
+            if best.is_none_or(|best| child.change < best.change) {
+                best = Some(child);
+            }
+        }
+        let highest = match self.shared.course.rules.acceptance {
+            Acceptance::Neutral => 0,
+            Acceptance::Strict => -1,
+        };
+        let accepted = best.filter(|best| best.change <= highest && self.has_room(best));
+        match accepted {
+            Some(child) => {
+                self.replace(&child);
+                let step = &mut self.members[child.victim].step;
+                *step = if child.is_birth { STEP_FIRST } else { grown(*step) };
+                self.done.births += u64::from(child.is_birth);
+                self.done.accepted += 1;
+                self.done.change += child.change;
+            }
+            None if was_changed => self.members[place].step = shrunk(self.members[place].step),
+            None => {}
+        }
+    }
+
+    /// Makes and evaluates one child; none if it is invalid.
+    fn candidate(&mut self, place: usize, fitness: i64, draws: Chain) -> Option<Candidate> {
+        let rules = &self.shared.course.rules;
+        let kind = draws.bits(slot::KIND);
+        if fitness <= 0 || kind >> 16 < rules.mix.birth_q16 {
+            return self.birth(place, fitness, draws);
+        }
+        self.changed(place, kind & 0xFFFF, draws)
+    }
+
+    fn setting(&self) -> Setting<'_> {
+        Setting { rules: &self.shared.course.rules, size_px: (self.shared.grid.width_px, self.shared.grid.height_px) }
+    }
+
+    fn birth(&mut self, place: usize, fitness: i64, draws: Chain) -> Option<Candidate> {
+        let rules = &self.shared.course.rules;
+        let victim = if fitness <= 0 { place } else { self.least_helpful(draws) };
+        let child = match rules.births.kind {
+            BirthKind::Fresh => {
+                let (x, y, shown_z) = self.worst_pixel(draws);
+                operators::newborn(
+                    &self.setting(),
+                    (x, y),
+                    shown_z,
+                    self.shared.course.guide.at(x as i32, y as i32),
+                    draws,
+                )
+            }
+            BirthKind::Mutant => {
+                let parent = draws.below(slot::PLACE, self.members.len() as u32) as usize;
+                if self.fitness(parent) <= 0 {
+                    return None;
+                }
+                operators::mutant(&self.members[parent].fly, &self.setting(), draws)
+            }
+        };
+        self.evaluate(victim, child, Paint::Birth)
+    }
+
+    fn changed(&mut self, place: usize, kind: u32, draws: Chain) -> Option<Candidate> {
+        let (setting, mix) = (self.setting(), &self.shared.course.rules.mix);
+        let Member { fly, step, .. } = self.members[place];
+        let total = mix.edge + mix.turn + mix.shift + mix.depth + mix.recolor;
+        let mut which = (kind * total) >> 16;
+        let mut is = |weight: u32| {
+            let hit = which < weight;
+            which = which.wrapping_sub(weight);
+            hit
+        };
+        let mut paint = if draws.bits(slot::RECOLOR) >> 16 < mix.recolor_q16 { Paint::Anew } else { Paint::Keep };
+        let child = if is(mix.edge) {
+            operators::edge_moved(&fly, &setting, step, draws)
+        } else if is(mix.turn) {
+            operators::turned(&fly, step, draws)
+        } else if is(mix.shift) {
+            operators::shifted(&fly, &setting, step, draws)
+        } else if is(mix.depth) {
+            operators::raised(&fly, step, draws)
+        } else {
+            paint = Paint::Anew;
+            fly
+        };
+        let child = if paint == Paint::Anew && self.shared.course.rules.color == ColorSource::Evolved {
+            operators::repainted(&child, step, draws)
+        } else {
+            child
+        };
+        self.evaluate(place, child, paint)
+    }
+
+    /// The least helpful of some random flies of the cell.
+    fn least_helpful(&self, draws: Chain) -> usize {
+        let mut best = (i64::MAX, 0);
+        for number in 0..self.shared.course.rules.births.victim_tournament {
+            let place = draws.below(slot::VICTIM + number, self.members.len() as u32) as usize;
+            let fitness = self.fitness(place);
+            if fitness < best.0 {
+                best = (fitness, place);
+            }
+        }
+        best.1
+    }
+
+    /// The worst of some random pixels of the cell, and the depth of what shows there.
+    fn worst_pixel(&self, draws: Chain) -> (u32, u32, u32) {
+        let [x0, y0, x1, y1] = self.shared.grid.bounds(self.number);
+        let mut worst = (-1, (x0, y0, 0));
+        for number in 0..self.shared.course.rules.births.place_tournament {
+            let bits = draws.bits(slot::PLACE + number);
+            let (x, y) = (x0 + below(bits << 16, x1 - x0), y0 + below(bits & 0xFFFF_0000, y1 - y0));
+            let (block, pixel) = self.area.place(x as i32, y as i32);
+            let top = &self.area.block(block).top;
+            if top.error[pixel] > worst.0 {
+                worst = (top.error[pixel], (x, y, top.z[pixel] as u32));
+            }
+        }
+        worst.1
+    }
+
+    /// The child within its bounds, with its colour, and the change that it would make.
+    fn evaluate(&mut self, victim: usize, child: Fly, paint: Paint) -> Option<Candidate> {
+        let (shared, rules) = (self.shared, &self.shared.course.rules);
+        let local = shared.course.guide.at(child.x >> 6, child.y >> 6);
+        let child = operators::bounded(&child, &rules.bounds, local);
+        let Member { index, fly: old, .. } = self.members[victim];
+        if paint != Paint::Birth && paint != Paint::Anew && child == old {
+            return None;
+        }
+        let footprint = Footprint::of(&child, (shared.grid.width_px, shared.grid.height_px));
+        if shared.grid.cell_of(&footprint) != self.number {
+            return None;
+        }
+        let seen =
+            Child { footprint: &footprint, z: child.z as i32, fly: index, overlap: rules.penalties.overlap as i32 };
+        let own =
+            shared.fitness[index as usize].load(Ordering::Relaxed) + operators::turn_penalty(&child, rules, local);
+        let has_new_color = paint != Paint::Keep && rules.color != ColorSource::Evolved;
+        let (child, change) = if has_new_color {
+            self.shown.collect(&self.area, &seen);
+            if self.shown.count() == 0 && paint == Paint::Birth {
+                return None;
+            }
+            let color = self.color(&child).unwrap_or(pack(child.color()));
+            (child.with_color(unpack(color)), self.shown.change(color))
+        } else {
+            (child, area::change(&self.area, &seen, pack(child.color())))
+        };
+        if child == old {
+            return None;
+        }
+        Some(Candidate { victim, fly: child, footprint, is_birth: paint == Paint::Birth, change: own + change })
+    }
+
+    /// The colour of the child that was collected; none if it would show nowhere.
+    fn color(&mut self, child: &Fly) -> Option<u32> {
+        let count = self.shown.count() as u32;
+        if count == 0 {
+            return None;
+        }
+        Some(match self.shared.course.rules.color {
+            ColorSource::Median => self.shown.median(),
+            ColorSource::Mean => pack(self.shown.sums().map(|sum| mean(sum, count))),
+            ColorSource::Pick => {
+                let (x, y) = ((child.x + 32) >> 6, (child.y + 32) >> 6);
+                let target = &self.shared.course.target;
+                pack(target.pixels()[y as usize * target.width_px() as usize + x as usize])
+            }
+            ColorSource::Evolved => pack(child.color()),
+        })
+    }
+
+    /// Whether no pixel's stack would become too deep.
+    fn has_room(&mut self, child: &Candidate) -> bool {
+        if !self.area.is_full(&child.footprint) {
+            return true;
+        }
+        let victim = self.members[child.victim].index;
+        let mut has_room = true;
+        self.area.exchange(&child.footprint, &Footprint::EMPTY, |block, pixel, _| {
+            if usize::from(block.depth[pixel]) == STACK_DEPTH {
+                has_room &= block.stack[pixel].iter().any(|entry| entry.fly == victim);
+            }
+        });
+        has_room
+    }
+
+    /// Puts the child where its victim was.
+    fn replace(&mut self, child: &Candidate) {
+        let shared = self.shared;
+        let Member { index, fly: old, .. } = self.members[child.victim];
+        let old_footprint = Footprint::of(&old, (shared.grid.width_px, shared.grid.height_px));
+        let old_z = shared.depths[index as usize].load(Ordering::Relaxed);
+        shared.depths[index as usize].store(child.fly.z, Ordering::Relaxed);
+        let change = Exchange {
+            shared,
+            cell: self.number,
+            fly: index,
+            color: pack(child.fly.color()),
+            keeps_depth: old_z == child.fly.z,
+            keeps_color: old.color() == child.fly.color(),
+        };
+        exchange(&mut self.area, &old_footprint, &child.footprint, &change);
+        self.members[child.victim].fly = child.fly;
+        if shared.course.rules.penalties.turn > 0 {
+            let penalty = |fly: &Fly| {
+                let local = shared.course.guide.at(fly.x >> 6, fly.y >> 6);
+                if fly.alive { operators::turn_penalty(fly, &shared.course.rules, local) } else { 0 }
+            };
+            add(shared, self.number, index, penalty(&old) - penalty(&child.fly));
+        }
+    }
+
+    /// Takes a fly off its pixels; its marginal fitness becomes 0.
+    fn take_away(&mut self, place: usize) {
+        let Member { index, fly, .. } = self.members[place];
+        let shared = self.shared;
+        let footprint = Footprint::of(&fly, (shared.grid.width_px, shared.grid.height_px));
+        let change =
+            Exchange { shared, cell: self.number, fly: index, color: 0, keeps_depth: false, keeps_color: false };
+        exchange(&mut self.area, &footprint, &Footprint::EMPTY, &change);
+        shared.fitness[index as usize].store(0, Ordering::Relaxed);
+    }
+
+    /// Removes a fly that does not help.
+    fn remove_useless(&mut self, place: usize) {
+        let fitness = self.fitness(place);
+        if self.members[place].fly.alive && fitness <= 0 {
+            self.take_away(place);
+            self.done.change += fitness;
+            self.members[place] = Member { fly: Fly::ABSENT, step: STEP_FIRST, ..self.members[place] };
+        }
+    }
+}
+
+/// How a child comes by its colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Paint {
+    /// It keeps its parent's.
+    Keep,
+    /// It takes a new one where it shows.
+    Anew,
+    /// It takes one, and must show somewhere.
+    Birth,
+}
+
+/// What the top fly of a pixel gains there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Excess {
+    fly: u32,
+    gain: i64,
+}
+
+impl Excess {
+    #[inline(always)]
+    fn of(block: &super::block::Block, pixel: usize) -> Self {
+        let gain = i64::from(block.under.error[pixel]) - i64::from(block.top.error[pixel]);
+        Self { fly: block.top.fly[pixel], gain }
+    }
+
+    /// Takes this off its fly's fitness and adds another one to its own.
+    #[inline(always)]
+    fn replace(self, new: Self, shared: &Shared<'_>, cell: u32) {
+        if self == new {
+            return;
+        }
+        if self.fly == new.fly {
+            if self.fly != NO_FLY {
+                add(shared, cell, self.fly, new.gain - self.gain);
+            }
+            return;
+        }
+        if self.fly != NO_FLY {
+            add(shared, cell, self.fly, -self.gain);
+        }
+        if new.fly != NO_FLY {
+            add(shared, cell, new.fly, new.gain);
+        }
+    }
+}
+
+/// Adds to a fly's marginal fitness: plainly to one of the cell's own, atomically to a frozen one.
+#[inline]
+fn add(shared: &Shared<'_>, cell: u32, fly: u32, amount: i64) {
+    let fitness = &shared.fitness[fly as usize];
+    if shared.owners[fly as usize] == cell && cell != NO_CELL {
+        fitness.store(fitness.load(Ordering::Relaxed) + amount, Ordering::Relaxed);
+    } else {
+        fitness.fetch_add(amount, Ordering::Relaxed);
+    }
+}
+
+/// One fly's change of place, depth or colour.
+struct Exchange<'a> {
+    shared: &'a Shared<'a>,
+    cell: u32,
+    fly: u32,
+    /// Its new colour.
+    color: u32,
+    keeps_depth: bool,
+    keeps_color: bool,
+}
+
+/// Takes a fly off the pixels of `old` and puts it on those of `new`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
+fn exchange(area: &mut Area<'_>, old: &Footprint, new: &Footprint, change: &Exchange<'_>) {
+    let Exchange { shared, cell, fly, color, keeps_depth, keeps_color } = *change;
+    let depth_of = |fly: u32| shared.depths[fly as usize].load(Ordering::Relaxed);
+    let own_z = depth_of(fly);
+    let is_behind = |other: u32| (own_z, fly) < (depth_of(other), other);
+    let mut covered = 0;
+    area.exchange(old, new, |block, pixel, [was, is]| {
+        if was && is && keeps_depth && keeps_color {
+            return;
+        }
+        let before = Excess::of(block, pixel);
+        let entry = Entry { fly, error: difference(block.target[pixel], color) * block.weight[pixel] };
+        let mut place = usize::MAX;
+        if was && is && keeps_depth {
+            place = block.recolor(pixel, entry);
+        } else {
+            if was {
+                place = block.remove(pixel, fly);
+                covered -= 1;
+            }
+            if is {
+                place = place.min(block.insert(pixel, entry, is_behind));
+                covered += 1;
+            }
+        }
+        if place < 2 {
+            block.surface(pixel, |fly| depth_of(fly) as i32);
+            before.replace(Excess::of(block, pixel), shared, cell);
+        }
+    });
+    add(shared, cell, fly, -covered * i64::from(shared.course.rules.penalties.overlap));
+}

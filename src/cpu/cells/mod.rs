@@ -1,0 +1,274 @@
+//! Twin of `glsl/cells.comp`: the `cells` search on the CPU, a task for each cell.
+
+mod area;
+mod block;
+mod cell;
+
+use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
+
+use rayon::prelude::*;
+
+use self::area::{Area, Shown};
+use self::block::{Block, PIXELS};
+use self::cell::{Cell, Done, Member, Shared};
+use crate::error::Result;
+use crate::model::blocks::{depth_order, index_of};
+use crate::model::cells::footprint::Footprint;
+use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
+use crate::model::cells::pixel::{BACKGROUND_Z, INSIDE, difference};
+use crate::model::cells::random::{Chain, Draw};
+use crate::model::cells::rules::STEP_FIRST;
+use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, operators};
+use crate::model::cells::{Grid, NO_CELL};
+use crate::model::fly::Z_MAX;
+use crate::model::tile::pack;
+use crate::model::{Fly, NO_FLY};
+
+/// A search on the CPU.
+pub struct CpuSearch {
+    course: Course,
+    blocks: Vec<Block>,
+    /// Blocks along the width.
+    columns: u32,
+    flies: Vec<Fly>,
+    steps: Vec<u32>,
+    fitness: Vec<AtomicI64>,
+    depths: Vec<AtomicU32>,
+    owners: Vec<u32>,
+    standing: Standing,
+}
+
+impl CpuSearch {
+    /// A search that begins with absent flies.
+    #[must_use]
+    pub fn new(course: Course) -> Self {
+        let (width, height) = (course.target.width_px(), course.target.height_px());
+        let (columns, rows) = (width.div_ceil(BLOCK_SIDE_PX), height.div_ceil(BLOCK_SIDE_PX));
+        let fly_count = course.fly_count;
+        let mut search = Self {
+            course,
+            blocks: vec![Block::outside(); (columns * rows) as usize],
+            columns,
+            flies: vec![Fly::ABSENT; fly_count],
+            steps: vec![STEP_FIRST; fly_count],
+            fitness: (0..fly_count).map(|_| AtomicI64::new(0)).collect(),
+            depths: (0..fly_count).map(|_| AtomicU32::new(Z_MAX)).collect(),
+            owners: vec![NO_CELL; fly_count],
+            standing: Standing::default(),
+        };
+        search.clear();
+        search
+    }
+
+    /// Takes all flies away.
+    fn clear(&mut self) {
+        let Course { target, rules, .. } = &self.course;
+        let (width, height) = (target.width_px(), target.height_px());
+        for (number, block) in self.blocks.iter_mut().enumerate() {
+            *block = Block::outside();
+            let (x, y) = (number as u32 % self.columns * BLOCK_SIDE_PX, number as u32 / self.columns * BLOCK_SIDE_PX);
+            for row in 0..BLOCK_SIDE_PX.min(height - y) {
+                for column in 0..BLOCK_SIDE_PX.min(width - x) {
+                    let color = pack(target.pixels()[((y + row) * width + x + column) as usize]);
+                    let pixel = (row * BLOCK_SIDE_PX + column) as usize;
+                    block.target[pixel] = color | INSIDE;
+                    let ground = difference(color, rules.background);
+                    block.ground[pixel] = ground + (rules.penalties.hole + rules.penalties.overlap) as i32;
+                    block.surface(pixel, |_| BACKGROUND_Z as i32);
+                }
+            }
+        }
+        self.flies.fill(Fly::ABSENT);
+        self.steps.fill(STEP_FIRST);
+        self.fitness.iter_mut().for_each(|fitness| *fitness.get_mut() = 0);
+        self.standing = Standing { objective: self.objective(), ..Standing::default() };
+    }
+
+    /// The objective, summed over pixels and flies.
+    fn objective(&self) -> i64 {
+        let Course { rules, guide, .. } = &self.course;
+        let overlap = i64::from(rules.penalties.overlap);
+        let of_pixels: i64 = self
+            .blocks
+            .iter()
+            .flat_map(|block| {
+                (0..PIXELS).filter(|&pixel| block.target[pixel] & INSIDE != 0).map(move |pixel| (block, pixel))
+            })
+            .map(|(block, pixel)| i64::from(block.top.error[pixel]) + overlap * (i64::from(block.depth[pixel]) - 1))
+            .sum();
+        let present = self.flies.iter().filter(|fly| fly.alive);
+        let of_flies: i64 =
+            present.map(|fly| operators::turn_penalty(fly, rules, guide.at(fly.x >> 6, fly.y >> 6))).sum();
+        of_pixels + of_flies
+    }
+
+    fn size_px(&self) -> (u32, u32) {
+        (self.course.target.width_px(), self.course.target.height_px())
+    }
+
+    /// One round.
+    fn round(&mut self) {
+        let grid = Grid::new(
+            self.course.rules.seed,
+            self.standing.rounds,
+            self.size_px(),
+            cell_side_px(self.course.rules.side),
+        );
+        let members = self.deal(&grid);
+        let shared = Shared {
+            course: &self.course,
+            grid: &grid,
+            owners: &self.owners,
+            fitness: &self.fitness,
+            depths: &self.depths,
+        };
+        let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Step);
+        let mut areas: Vec<Vec<&mut Block>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+        for (number, block) in self.blocks.iter_mut().enumerate() {
+            let (x, y) = (number as u32 % self.columns * BLOCK_SIDE_PX, number as u32 / self.columns * BLOCK_SIDE_PX);
+            areas[grid.cell_at(x, y) as usize].push(block);
+        }
+        let mut work: Vec<_> = members.into_iter().zip(areas).zip(0..).filter(|((m, _), _)| !m.is_empty()).collect();
+        work.sort_by_key(|((members, _), number)| (std::cmp::Reverse(members.len()), *number));
+        let results: Vec<(Vec<Member>, Done)> = work
+            .into_par_iter()
+            .with_max_len(1)
+            .map(|((members, blocks), number)| {
+                let [x0, y0, x1, _] = grid.bounds(number);
+                let columns = (x1.div_ceil(BLOCK_SIDE_PX) - x0 / BLOCK_SIDE_PX) as usize;
+                let first = ((x0 / BLOCK_SIDE_PX) as i32, (y0 / BLOCK_SIDE_PX) as i32);
+                let area = Area::new(blocks, columns, first);
+                let shared = &shared;
+                let mut cell = Cell { shared, number, area, members, shown: Shown::default(), done: Done::default() };
+                cell.run(chain.then(number));
+                (cell.members, cell.done)
+            })
+            .collect();
+        for (members, done) in results {
+            for Member { index, fly, step } in members {
+                self.flies[index as usize] = fly;
+                self.steps[index as usize] = step;
+            }
+            self.standing.evals += done.evals;
+            self.standing.births += done.births;
+            self.standing.accepted += done.accepted;
+            self.standing.objective += done.change;
+        }
+        self.standing.rounds += 1;
+    }
+
+    /// Gives every fly its cell.
+    fn deal(&mut self, grid: &Grid) -> Vec<Vec<Member>> {
+        let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Deal);
+        let mut members: Vec<Vec<Member>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+        for (index, fly) in (0_u32..).zip(&self.flies) {
+            let cell = if fly.alive {
+                grid.cell_of(&Footprint::of(fly, self.size_px()))
+            } else {
+                self.deal_absent(grid, chain.then(index))
+            };
+            self.owners[index as usize] = cell;
+            if cell != NO_CELL {
+                members[cell as usize].push(Member { index, fly: *fly, step: self.steps[index as usize] });
+            }
+        }
+        members
+    }
+
+    /// The cell of the worst of some random pixels.
+    fn deal_absent(&self, grid: &Grid, draws: Chain) -> u32 {
+        let mut worst = (-1, 0);
+        for number in 0..self.course.rules.deal_tournament {
+            let (x, y) = (draws.below(2 * number, grid.width_px), draws.below(2 * number + 1, grid.height_px));
+            let block = &self.blocks[(y / BLOCK_SIDE_PX * self.columns + x / BLOCK_SIDE_PX) as usize];
+            let error = block.top.error[(y % BLOCK_SIDE_PX * BLOCK_SIDE_PX + x % BLOCK_SIDE_PX) as usize];
+            if error > worst.0 {
+                worst = (error, grid.cell_at(x, y));
+            }
+        }
+        worst.1
+    }
+}
+
+impl Search for CpuSearch {
+    fn course(&self) -> &Course {
+        &self.course
+    }
+
+    fn load(&mut self, flies: &[Fly]) -> Result<()> {
+        assert_eq!(flies.len(), self.course.fly_count, "a search keeps its number of flies");
+        self.clear();
+        let (target, rules) = (&self.course.target, &self.course.rules);
+        let grid = Grid::whole(target.width_px(), target.height_px());
+        let shared = Shared {
+            course: &self.course,
+            grid: &grid,
+            owners: &self.owners,
+            fitness: &self.fitness,
+            depths: &self.depths,
+        };
+        let area = Area::new(self.blocks.iter_mut().collect(), self.columns as usize, (0, 0));
+        let members = (0..).zip(flies).map(|(index, _)| Member { index, fly: Fly::ABSENT, step: STEP_FIRST }).collect();
+        let mut cell =
+            Cell { shared: &shared, number: 0, area, members, shown: Shown::default(), done: Done::default() };
+        // Nearest first, so that it is the deepest flies that find no room.
+        for key in depth_order(flies) {
+            let index = index_of(key) as usize;
+            if flies[index].alive {
+                let local = self.course.guide.at(flies[index].x >> 6, flies[index].y >> 6);
+                cell.place(index, &operators::bounded(&flies[index], &rules.bounds, local));
+            }
+        }
+        for Member { index, fly, .. } in cell.members {
+            self.flies[index as usize] = fly;
+        }
+        self.standing.objective = self.objective();
+        Ok(())
+    }
+
+    fn advance(&mut self, rounds: u32) -> Result<()> {
+        (0..rounds).for_each(|_| self.round());
+        Ok(())
+    }
+
+    fn renormalise(&mut self) -> Result<()> {
+        let order = depth_order(&self.flies);
+        let count = order.len() as u64;
+        for (rank, key) in (0_u64..).zip(order) {
+            let index = index_of(key) as usize;
+            self.flies[index].z = ((2 * rank + 1) * (u64::from(Z_MAX) + 1) / (2 * count)) as u32;
+            self.depths[index].store(self.flies[index].z, Ordering::Relaxed);
+        }
+        let depths = &self.depths;
+        self.blocks.par_iter_mut().for_each(|block| {
+            for layer in [&mut block.top, &mut block.under] {
+                for (z, &fly) in layer.z.iter_mut().zip(&layer.fly) {
+                    if fly != NO_FLY {
+                        *z = depths[fly as usize].load(Ordering::Relaxed) as i32;
+                    }
+                }
+            }
+        });
+        Ok(())
+    }
+
+    fn standing(&self) -> Standing {
+        self.standing
+    }
+
+    fn read_back(&mut self) -> Result<SearchState> {
+        let fitness = self.fitness.iter().map(|fitness| fitness.load(Ordering::Relaxed)).collect();
+        Ok(SearchState { flies: self.flies.clone(), steps: self.steps.clone(), fitness })
+    }
+
+    fn read_back_stacks(&mut self) -> Result<Stacks> {
+        let (width, height) = self.size_px();
+        let stack_at = |x: u32, y: u32| {
+            let block = &self.blocks[(y / BLOCK_SIDE_PX * self.columns + x / BLOCK_SIDE_PX) as usize];
+            let pixel = (y % BLOCK_SIDE_PX * BLOCK_SIDE_PX + x % BLOCK_SIDE_PX) as usize;
+            block.stack[pixel][..usize::from(block.depth[pixel])].iter().map(|entry| (entry.fly, entry.error)).collect()
+        };
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| stack_at(x, y)).collect();
+        Ok(Stacks { pixels })
+    }
+}

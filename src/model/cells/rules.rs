@@ -1,0 +1,231 @@
+//! Everything that decides a step of the cells search besides the picture: operators, their weights and amplitudes,
+//! bounds and penalties. The one place for these numbers; the ablation bench (`cargo bench --bench ablation`) shows what each of
+//! them is worth.
+
+use crate::model::fly::{SIDE_MIN, UNITS_PER_PX};
+use crate::model::target::Rgb;
+use crate::model::tile::pack;
+
+/// Fixed-point one of weights and probabilities.
+pub const ONE_Q16: u32 = 1 << 16;
+/// Largest side that the search makes; with it an error summed over a tile fits 32 bits.
+pub const SEARCH_SIDE_MAX: u32 = 1_024 * UNITS_PER_PX;
+/// First step size of a fly, u16.16: 0.3.
+pub const STEP_FIRST: u32 = 19_661;
+/// Largest step size: 1.
+pub const STEP_MAX: u32 = 65_536;
+/// Smallest step size: 0.01.
+pub const STEP_MIN: u32 = 655;
+/// An accepted change lets the step grow by this over 256: 1.4.
+pub const STEP_GROWTH_Q8: u32 = 358;
+/// A refused one lets it shrink: 0.92.
+pub const STEP_SHRINK_Q8: u32 = 235;
+
+/// Where a child's colour comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum ColorSource {
+    /// The median of the target where the child would show: least SAE.
+    Median = 0,
+    /// The mean of the target where the child would show: least squares.
+    Mean = 1,
+    /// The target's pixel nearest to the child's centre.
+    Pick = 2,
+    /// Inherited and mutated; of newborn tiles random.
+    Evolved = 3,
+}
+
+/// Which changes are accepted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Acceptance {
+    /// Those that do not raise the objective.
+    Neutral = 0,
+    /// Only those that lower it.
+    Strict = 1,
+}
+
+/// What a newborn tile is like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum BirthKind {
+    /// A new tile at a place of large error.
+    Fresh = 0,
+    /// A mutated copy of a fly of the cell that helps.
+    Mutant = 1,
+}
+
+/// How deep a newborn tile lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum BirthDepth {
+    /// Just in front of what shows at its place.
+    Front = 0,
+    /// Anywhere.
+    Random = 1,
+}
+
+/// How often each operator is applied. Weights are relative to their sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Mix {
+    /// Chance of a birth in a step whose fly helps, over 65,536.
+    pub birth_q16: u32,
+    /// Chance that a changed fly is recoloured too, over 65,536.
+    pub recolor_q16: u32,
+    /// Weight of moving one edge.
+    pub edge: u32,
+    /// Weight of turning.
+    pub turn: u32,
+    /// Weight of moving, resizing and turning a little.
+    pub shift: u32,
+    /// Weight of a change of depth.
+    pub depth: u32,
+    /// Weight of recolouring alone.
+    pub recolor: u32,
+}
+
+/// Births.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Births {
+    /// What newborn tiles are like.
+    pub kind: BirthKind,
+    /// How deep they lie.
+    pub depth: BirthDepth,
+    /// Random pixels of which the one with the largest error is the place; 1 is a uniform place.
+    pub place_tournament: u32,
+    /// Random flies of the cell of which the least helpful dies.
+    pub victim_tournament: u32,
+    /// Smallest side over the mean side, as a logarithm in steps of 1/256.
+    pub side_low: i32,
+    /// Largest side over the mean side, as a logarithm in steps of 1/256.
+    pub side_high: i32,
+    /// Largest ratio of the two sides, as a logarithm in steps of 1/256.
+    pub aspect_high: i32,
+    /// Standard deviation of the angle around the guide's direction, in 1/65536 of a turn.
+    pub angle_spread: u32,
+    /// Where the guide's coherence (0 to 255) is below a random number of 0 to this, the angle is random; 0 always follows
+    /// the guide.
+    pub coherence_range: u32,
+}
+
+/// What every fly obeys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Bounds {
+    /// Smallest side in 1/64 px.
+    pub side_min: u32,
+    /// Largest side in 1/64 px, at most [`SEARCH_SIDE_MAX`].
+    pub side_max: u32,
+    /// Largest ratio of the longer to the shorter side, over 256.
+    pub aspect_max_q8: u32,
+    /// Whether `side_min` and `side_max` are scaled by the guide's local size at the fly's centre (1) or not (0).
+    pub local_size: u32,
+}
+
+/// What is added to the error, so that tiles lie as a style wants them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Penalties {
+    /// For each further tile on a covered pixel.
+    pub overlap: u32,
+    /// For each pixel that no tile covers.
+    pub hole: u32,
+    /// For a tile that is turned 45 degrees (mod 90) from the guide's direction, per pixel of its area; the penalty grows with
+    /// the square of the deviation.
+    pub turn: u32,
+}
+
+/// Everything that decides a step besides the picture and its guide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Rules {
+    /// Names all random numbers.
+    pub seed: u64,
+    /// The mean side d of tiles (paper Eq. 1) in 1/64 px.
+    pub side: u32,
+    /// Children tried in each step, 1 to [`CANDIDATES_MAX`]; the best one counts.
+    pub candidates: u32,
+    /// Steps in each cell and round for each of its flies.
+    pub steps_per_fly: u32,
+    /// Random pixels of which the one with the largest error gives an absent fly its cell.
+    pub deal_tournament: u32,
+    /// Where colours come from.
+    pub color: ColorSource,
+    /// Which changes are accepted.
+    pub acceptance: Acceptance,
+    /// How often each operator is applied.
+    pub mix: Mix,
+    /// Births.
+    pub births: Births,
+    /// What every fly obeys.
+    pub bounds: Bounds,
+    /// What is added to the error.
+    pub penalties: Penalties,
+    /// Colour behind all tiles, packed.
+    pub background: u32,
+    /// Width of the grout ring of every tile in 1/64 px; 0 is none.
+    pub grout: u32,
+    /// Colour of the grout, packed.
+    pub grout_color: u32,
+}
+
+/// Most candidates of a step.
+pub const CANDIDATES_MAX: u32 = 64;
+
+impl Rules {
+    /// The rules of the style `free` for tiles of the mean side `side` (1/64 px).
+    #[must_use]
+    pub fn free(seed: u64, side: u32, background: Rgb) -> Self {
+        Self {
+            seed,
+            side,
+            candidates: 1,
+            steps_per_fly: 4,
+            deal_tournament: 4,
+            color: ColorSource::Median,
+            acceptance: Acceptance::Neutral,
+            mix: Mix {
+                birth_q16: ONE_Q16 / 5,
+                recolor_q16: ONE_Q16 / 5,
+                edge: 60,
+                turn: 10,
+                shift: 10,
+                depth: 2,
+                recolor: 2,
+            },
+            births: Births {
+                kind: BirthKind::Fresh,
+                depth: BirthDepth::Front,
+                place_tournament: 8,
+                victim_tournament: 32,
+                // 0.3 d to 6 d.
+                side_low: -308,
+                side_high: 459,
+                aspect_high: 1024,
+                angle_spread: 65_536 / 36,
+                coherence_range: 128,
+            },
+            bounds: Bounds {
+                side_min: SIDE_MIN,
+                side_max: (side * 8).min(SEARCH_SIDE_MAX),
+                aspect_max_q8: u32::MAX >> 18,
+                local_size: 0,
+            },
+            penalties: Penalties::default(),
+            background: pack(background),
+            grout: 0,
+            grout_color: 0,
+        }
+    }
+}
+
+/// The step size after a changed child of the fly was accepted.
+#[inline]
+#[must_use]
+pub fn grown(step: u32) -> u32 {
+    ((step * STEP_GROWTH_Q8) >> 8).min(STEP_MAX)
+}
+
+/// The step size after all changed children of the fly were refused.
+#[inline]
+#[must_use]
+pub fn shrunk(step: u32) -> u32 {
+    ((step * STEP_SHRINK_Q8) >> 8).max(STEP_MIN)
+}

@@ -1,0 +1,95 @@
+//! What a search answers, whoever computes it: the CPU twin or a device.
+
+use std::sync::Arc;
+
+use super::rules::Rules;
+use crate::error::Result;
+use crate::model::{Fly, Guide, MaskSet, Target};
+
+/// What stays the same while a picture is searched.
+#[derive(Clone, Debug)]
+pub struct Course {
+    /// What decides the steps.
+    pub rules: Rules,
+    /// The picture to match.
+    pub target: Arc<Target>,
+    /// Directions and sizes for the tiles.
+    pub guide: Arc<Guide>,
+    /// Tile shapes that the flies may wear.
+    pub masks: Arc<MaskSet>,
+    /// Number of flies, absent ones included.
+    pub fly_count: usize,
+}
+
+/// How far a search has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Standing {
+    /// Rounds made.
+    pub rounds: u32,
+    /// Children evaluated.
+    pub evals: u64,
+    /// Children born at a place of large error that were accepted.
+    pub births: u64,
+    /// Children accepted in all.
+    pub accepted: u64,
+    /// What the search lowers: the error, weighed as the target says, and all penalties.
+    pub objective: i64,
+}
+
+/// The population as a search leaves it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SearchState {
+    /// The flies.
+    pub flies: Vec<Fly>,
+    /// Their step sizes, u16.16.
+    pub steps: Vec<u32>,
+    /// Their marginal fitness: the objective without a fly minus the objective with it.
+    pub fitness: Vec<i64>,
+}
+
+/// The flies on every pixel, nearest first, and their errors; pixels row by row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stacks {
+    /// Per pixel, (fly, error) of each fly on it.
+    pub pixels: Vec<Vec<(u32, i32)>>,
+}
+
+/// Searches one picture, round by round. Every implementation comes to the same state after every round.
+pub trait Search: Send {
+    /// What stays the same.
+    fn course(&self) -> &Course;
+
+    /// Replaces the population, and begins to count anew. Flies that would stack deeper on a pixel than the search keeps track
+    /// of become absent.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn load(&mut self, flies: &[Fly]) -> Result<()>;
+
+    /// Makes some rounds.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn advance(&mut self, rounds: u32) -> Result<()>;
+
+    /// Spreads the depths evenly over their range, in the same order: the picture stays as it is.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn renormalise(&mut self) -> Result<()>;
+
+    /// How far it has come.
+    fn standing(&self) -> Standing;
+
+    /// The population.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn read_back(&mut self) -> Result<SearchState>;
+
+    /// The flies on every pixel.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn read_back_stacks(&mut self) -> Result<Stacks>;
+}
