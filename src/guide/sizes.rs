@@ -106,7 +106,7 @@ fn balanced(pixels: &[u64]) -> Vec<u32> {
         (0..pixels.len() as i32).map(size).collect::<Vec<_>>()
     };
     let fits = |shift: i32| {
-        let area = |size: u32| (f64::from(SIZE_ONE) / f64::from(size)).powi(2);
+        let area = |size: u32| f64::from(SIZE_ONE * SIZE_ONE) / f64::from(size * size);
         let sizes = sizes(shift);
         let tiles: f64 = sizes.iter().zip(pixels).map(|(&size, &pixels)| area(size) * pixels as f64).sum();
         tiles <= pixels.iter().sum::<u64>() as f64
