@@ -14,7 +14,7 @@ use crate::model::cells::random::{Chain, below};
 use crate::model::cells::rules::{Acceptance, BirthKind, ColorSource, STEP_FIRST, grown, shrunk};
 use crate::model::cells::{Course, Grid, NO_CELL};
 use crate::model::tile::{pack, unpack};
-use crate::model::{Fly, NO_FLY};
+use crate::model::{Fly, GuideSample, NO_FLY};
 
 /// What all cells of a round share.
 pub struct Shared<'a> {
@@ -136,8 +136,19 @@ impl Cell<'_> {
         self.changed(place, kind & 0xFFFF, draws)
     }
 
-    fn setting(&self) -> Setting<'_> {
-        Setting { rules: &self.shared.course.rules, size_px: (self.shared.grid.width_px, self.shared.grid.height_px) }
+    /// What an operator needs for a fly, by its place among the members, at a place of this local size.
+    fn setting(&self, place: usize, local: GuideSample) -> Setting<'_> {
+        let rules = &self.shared.course.rules;
+        Setting {
+            rules,
+            own_side: rules.own_side(self.members[place].index, local),
+            size_px: (self.shared.grid.width_px, self.shared.grid.height_px),
+        }
+    }
+
+    /// What the guide says at a fly's centre.
+    fn local(&self, fly: &Fly) -> GuideSample {
+        self.shared.course.guide.at(fly.x >> 6, fly.y >> 6)
     }
 
     fn birth(&mut self, place: usize, fitness: i64, draws: Chain) -> Option<Candidate> {
@@ -146,28 +157,24 @@ impl Cell<'_> {
         let child = match rules.births.kind {
             BirthKind::Fresh => {
                 let (x, y, shown_z) = self.worst_pixel(draws);
-                operators::newborn(
-                    &self.setting(),
-                    (x, y),
-                    shown_z,
-                    self.shared.course.guide.at(x as i32, y as i32),
-                    draws,
-                )
+                let local = self.shared.course.guide.at(x as i32, y as i32);
+                operators::newborn(&self.setting(victim, local), (x, y), shown_z, local, draws)
             }
             BirthKind::Mutant => {
                 let parent = draws.below(slot::PLACE, self.members.len() as u32) as usize;
                 if self.fitness(parent) <= 0 {
                     return None;
                 }
-                operators::mutant(&self.members[parent].fly, &self.setting(), draws)
+                let parent = &self.members[parent].fly;
+                operators::mutant(parent, &self.setting(victim, self.local(parent)), draws)
             }
         };
         self.evaluate(victim, child, Paint::Birth)
     }
 
     fn changed(&mut self, place: usize, kind: u32, draws: Chain) -> Option<Candidate> {
-        let (setting, mix) = (self.setting(), &self.shared.course.rules.mix);
         let Member { fly, step, .. } = self.members[place];
+        let (setting, mix) = (self.setting(place, self.local(&fly)), &self.shared.course.rules.mix);
         let total = mix.edge + mix.turn + mix.shift + mix.depth + mix.recolor;
         let mut which = (kind * total) >> 16;
         let mut is = |weight: u32| {
@@ -228,9 +235,9 @@ impl Cell<'_> {
     /// The child within its bounds, with its colour, and the change that it would make.
     fn evaluate(&mut self, victim: usize, child: Fly, paint: Paint) -> Option<Candidate> {
         let (shared, rules) = (self.shared, &self.shared.course.rules);
-        let local = shared.course.guide.at(child.x >> 6, child.y >> 6);
-        let child = operators::bounded(&child, &rules.bounds, local);
+        let local = self.local(&child);
         let Member { index, fly: old, .. } = self.members[victim];
+        let child = operators::bounded(&child, &rules.bounds, rules.own_side(index, local));
         if paint != Paint::Birth && paint != Paint::Anew && child == old {
             return None;
         }

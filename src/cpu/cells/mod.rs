@@ -161,9 +161,12 @@ impl CpuSearch {
     fn deal(&mut self, grid: &Grid) -> Vec<Vec<Member>> {
         let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Deal);
         let mut members: Vec<Vec<Member>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+        let round = self.standing.rounds;
         for (index, fly) in (0_u32..).zip(&self.flies) {
             let cell = if fly.alive {
                 grid.cell_of(&Footprint::of(fly, self.size_px()))
+            } else if self.course.rules.class_of(index).first_round > round {
+                NO_CELL
             } else {
                 self.deal_absent(grid, chain.then(index))
             };
@@ -216,7 +219,8 @@ impl Search for CpuSearch {
             let index = index_of(key) as usize;
             if flies[index].alive {
                 let local = self.course.guide.at(flies[index].x >> 6, flies[index].y >> 6);
-                cell.place(index, &operators::bounded(&flies[index], &rules.bounds, local));
+                let own_side = rules.own_side(index as u32, local);
+                cell.place(index, &operators::bounded(&flies[index], &rules.bounds, own_side));
             }
         }
         for Member { index, fly, .. } in cell.members {
