@@ -42,7 +42,7 @@ impl Job {
     /// lists of the population do not fit into memory.
     pub(super) fn load(options: &EvolveOptions) -> Result<Self> {
         let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
-        let of_init = init.as_ref().map(|population| population.background);
+        let of_init = init.as_ref().map(|population| population.background.color());
         let background = options.background.or(of_init).unwrap_or_default();
         let reading = ReadOptions { background, long_side_px: Some(options.long_side_px) };
         let Loaded { mut photo, original_width_px, original_height_px, sha256, warnings } =
@@ -87,7 +87,7 @@ impl Job {
         Population {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
-            background: self.background,
+            background: self.background.into(),
             grout: None,
             masks: self.masks(),
             flies,

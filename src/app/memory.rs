@@ -100,7 +100,7 @@ mod tests {
         let population = Population {
             width_px: 2048,
             height_px: 2048,
-            background: [0; 3],
+            background: [0; 3].into(),
             grout: None,
             masks: MaskSet::default(),
             flies,
