@@ -53,7 +53,7 @@ impl Mosaic {
             let samples_of = |column: u32| {
                 let starts =
                     (0..supersampling).map(move |row| (row * patch.width_px + column * supersampling) as usize);
-                starts.flat_map(move |start| rows[start..][..supersampling as usize].iter().copied())
+                starts.map(move |start| &rows[start..][..supersampling as usize])
             };
             let pixels = (0..).zip(&mut self.pixels[first..][..width]);
             match &mut self.alpha {
@@ -67,24 +67,28 @@ impl Mosaic {
 }
 
 /// The mean colour of `supersampling`² samples.
-fn mean(samples: impl Iterator<Item = u32>, supersampling: u32) -> Rgb {
+fn mean<'a>(rows: impl Iterator<Item = &'a [u32]>, supersampling: u32) -> Rgb {
     let count = supersampling * supersampling;
     let mut sums = [0; 3];
-    samples.for_each(|sample| {
-        sums.iter_mut().zip(unpack(sample)).for_each(|(sum, channel)| *sum += u32::from(channel));
-    });
+    for row in rows {
+        for &sample in row {
+            sums.iter_mut().zip(unpack(sample)).for_each(|(sum, channel)| *sum += u32::from(channel));
+        }
+    }
     sums.map(|sum| ((sum + count / 2) / count) as u8)
 }
 
 /// The mean opacity of `supersampling`² samples, and the mean of their colours weighted by it; black if it is 0.
-fn mean_with_alpha(samples: impl Iterator<Item = u32>, supersampling: u32) -> (Rgb, u8) {
+fn mean_with_alpha<'a>(rows: impl Iterator<Item = &'a [u32]>, supersampling: u32) -> (Rgb, u8) {
     let count = supersampling * supersampling;
     let (mut sums, mut weight) = ([0; 3], 0);
-    samples.for_each(|sample| {
-        let alpha = sample >> 24;
-        sums.iter_mut().zip(unpack(sample)).for_each(|(sum, channel)| *sum += alpha * u32::from(channel));
-        weight += alpha;
-    });
+    for row in rows {
+        for &sample in row {
+            let alpha = sample >> 24;
+            sums.iter_mut().zip(unpack(sample)).for_each(|(sum, channel)| *sum += alpha * u32::from(channel));
+            weight += alpha;
+        }
+    }
     match (weight + count / 2) / count {
         0 => ([0; 3], 0),
         alpha => (sums.map(|sum| ((sum + weight / 2) / weight) as u8), alpha as u8),
