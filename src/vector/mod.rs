@@ -1,9 +1,10 @@
 //! Populations as SVG: one element per living fly, the farthest first, so that the document's order is the depth order.
 //!
 //! Geometry comes from the integer genes alone. A user unit is 1/128 px, half of a gene's unit, so that the corners of
-//! tiles before they are turned are whole numbers; the view box begins at -64, since the centre of pixel (0, 0) is the origin. Masks
-//! stand once in `<defs>` (`shapes.rs`). A tile with grout is its shape in the grout's colour, and what lies inside its ring
-//! over that. A transparent picture has no background element. Plain SVG 1.1 without scripts, fonts or links, the same bytes every time.
+//! tiles before they are turned are whole numbers; the view box begins at -64, since the centre of pixel (0, 0) is the
+//! origin. Masks stand once in `<defs>` (`shapes.rs`). A tile with grout is its shape in the grout's colour, and what lies
+//! inside its ring over that. A transparent picture has no background element. Plain SVG 1.1 without scripts, fonts or
+//! links, the same bytes every time.
 
 mod base64;
 mod outline;
