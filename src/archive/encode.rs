@@ -31,7 +31,8 @@ enum Thrift {
 ///
 /// # Errors
 /// [`Error::Usage`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the file
-/// (`schema`, `width_px`, `height_px`, `background`, `transparent`, `blend`, `grout`), or if there are more than [`FLY_COUNT_MAX`] flies.
+/// (`schema`, `width_px`, `height_px`, `background`, `transparent`, `blend`, `grout`), or if there are more than
+/// [`FLY_COUNT_MAX`] flies.
 pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
     let fly_count = population.flies.len();
     if fly_count != fitness.len() || fly_count > FLY_COUNT_MAX {
