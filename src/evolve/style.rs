@@ -4,8 +4,8 @@
 //! of tiles. All numbers are integers: they decide the picture.
 
 use crate::model::Rgb;
-use crate::model::cells::rules::{ASPECT_FREE_Q8, Births, Bounds, CLASSES_MAX, Class, Mix, ONE_Q16, Penalties};
 use crate::model::cells::Rules;
+use crate::model::cells::rules::{ASPECT_FREE_Q8, Births, Bounds, CLASSES_MAX, Class, Mix, ONE_Q16, Penalties};
 use crate::model::tables::size_factor_q16;
 use crate::model::tile::pack;
 
