@@ -49,7 +49,7 @@ impl Job {
     /// lists of the population do not fit into memory.
     pub(super) fn load(options: &EvolveOptions) -> Result<Self> {
         let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
-        let of_init = init.as_ref().map(|population| population.background);
+        let of_init = init.as_ref().map(|population| population.background.color());
         let background = options.background.or(of_init).unwrap_or_default();
         let behind = if keeps_transparency(options) { Background::Transparent } else { Background::Color(background) };
         let reading = ReadOptions { background: behind, long_side_px: Some(options.long_side_px) };
@@ -94,7 +94,7 @@ impl Job {
         Population {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
-            background: self.background,
+            background: self.background.into(),
             grout: None,
             masks: self.masks(),
             flies,

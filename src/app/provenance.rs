@@ -26,7 +26,7 @@ pub(super) const SOFTWARE: &str = "smalti";
 /// Keyword of the text chunk or comment that holds the metadata as JSON.
 pub(super) const KEYWORD: &str = "smalti";
 /// What the header of a population file already tells.
-const HEADER_KEYS: [&str; 5] = ["width_px", "height_px", "background", "blend", "grout"];
+const HEADER_KEYS: [&str; 6] = ["width_px", "height_px", "background", "transparent", "blend", "grout"];
 
 /// Everything that decides a result.
 #[derive(Clone, Debug)]

@@ -246,7 +246,7 @@ mod tests {
         let stage = Population {
             width_px: 9,
             height_px: 9,
-            background: [0; 3],
+            background: [0; 3].into(),
             grout: None,
             masks: MaskSet::default(),
             flies: Vec::new(),

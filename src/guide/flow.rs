@@ -53,7 +53,8 @@ impl Contours {
         for place in 0..count {
             let ((x, y), strength) = (tensors.along(place), strength(place));
             let coherence = tensors.coherence(place);
-            let weight = (strength / (scale * scale)).min(1.0) * coherence * coherence;
+            let relative = (2.0 * strength / (scale * scale)).min(1.0);
+            let weight = relative * relative.sqrt() * coherence * coherence;
             let share = if strength > 0.0 { weight / strength } else { 0.0 };
             contours.pulls.push([(x * share) as f32, (y * share) as f32]);
             contours.weights.push(weight as f32);
@@ -149,5 +150,7 @@ impl Field {
 ///
 /// With a stiffness of a sixteenth of its square, a contour as long as `smoothing` still bends the rows beside it.
 pub(super) fn flow(tensors: &Tensors, smoothing: f64) -> Field {
+    // Without any stiffness there would be no field where no contour is.
+    let smoothing = smoothing.max(0.25);
     Contours::of(tensors).follow((smoothing * smoothing / 16.0) as f32)
 }

@@ -19,7 +19,7 @@ use tensor::Tensors;
 /// What a [`flowing`] guide is wanted for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flow<'a> {
-    /// Mean side of a tile in 1/64 px: contours finer than half of it do not count, and sizes are alike over two.
+    /// Mean side of a tile in 1/64 px: contours finer than half of it do not count, and sizes change slowly over two.
     pub tile_side: u32,
     /// Over how many 1/64 px the directions are smoothed; one to three sides of a tile look laid by hand.
     pub smoothing: u32,
@@ -45,6 +45,9 @@ pub fn sharp(target: &Target) -> Guide {
 
 /// Directions that flow along the contours, and on into flat areas, and sizes that follow the detail.
 ///
+/// Every place of a picture that has a contour at all has a direction; coherence fades with the distance from contours
+/// and where they contradict each other. The outermost [`GUIDE_PX`] px are taken for like those within.
+///
 /// # Panics
 /// If there are weights, but not one per pixel.
 #[must_use]
@@ -53,7 +56,7 @@ pub fn flowing(target: &Target, flow: &Flow<'_>) -> Guide {
     let in_squares = |length: u32| f64::from(length) / f64::from(UNITS_PER_PX * GUIDE_PX);
     let side = in_squares(flow.tile_side);
     let tensors = Tensors::of(target).without_frame();
-    let demand = Demand { sigma: 1.5 * side, strength_q8: flow.size_strength_q8, weights: flow.weights };
+    let demand = Demand { sigma: 1.25 * side, strength_q8: flow.size_strength_q8, weights: flow.weights };
     let sizes = sizes::sizes(target, &tensors, &demand);
     let field = flow::flow(&tensors.smoothed(0.5 * side), in_squares(flow.smoothing));
     let sample = |place: usize| {

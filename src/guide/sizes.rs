@@ -12,12 +12,14 @@ use crate::model::guide::{GUIDE_PX, SIZE_ONE};
 const SIZE_MIN: u32 = (SIZE_ONE * 6).div_ceil(10);
 /// Largest side over the mean side: 1.7.
 const SIZE_MAX: u32 = SIZE_ONE * 17 / 10;
+/// How far a size may lie from the middle one before the last smoothing; beyond it the bounds would only cut a cliff.
+const REACH_OCTAVES: f64 = 0.8;
 /// Steps of the logarithm of a size per factor of two.
 const STEPS_PER_OCTAVE: f64 = 1024.0;
 
 /// How pixels are weighed, and how strongly sizes answer.
 pub(super) struct Demand<'a> {
-    /// Deviation of the smoothing, in squares.
+    /// Deviation of both smoothings, of the detail and of the sizes, in squares.
     pub sigma: f64,
     /// The exponent of the detail, in 1/256 of a third.
     pub strength_q8: u32,
@@ -27,32 +29,47 @@ pub(super) struct Demand<'a> {
 
 /// Side over mean side of each square in units of 1/[`SIZE_ONE`]; `1 / size^2` has a mean of 1 over all pixels.
 pub(super) fn sizes(target: &Target, tensors: &Tensors, demand: &Demand<'_>) -> Vec<u32> {
-    // 1/256 of a step of the root is far below what noise does.
-    let steepness: Vec<i64> =
-        tensors.trace.iter().map(|&trace| libm::rint(256.0 * (trace as f64).sqrt()) as i64).collect();
-    let steepness = smoothed(&steepness, tensors.columns, demand.sigma);
-    let mean = |plane: &[i64]| plane.iter().sum::<i64>() as f64 / plane.len() as f64;
-    let floor = mean(&steepness) / 16.0 + 1.0;
-    let weights = demand.weights.map(|weights| {
-        let weights = smoothed(&mean_weights(target, weights, tensors.columns), tensors.columns, demand.sigma);
-        let mean = mean(&weights);
-        weights.iter().map(|&weight| weight as f64 / mean).collect::<Vec<_>>()
-    });
-    let exponent = -f64::from(demand.strength_q8) / 256.0 / 3.0;
-    let step = |place: usize| {
-        let weight = weights.as_ref().map_or(1.0, |weights| weights[place]);
-        let detail = (steepness[place] as f64 + floor) * weight;
-        libm::rint(exponent * STEPS_PER_OCTAVE * libm::log2(detail)) as i32
-    };
-    let steps: Vec<i32> = (0..steepness.len()).map(step).collect();
+    let steps = steps(&details(target, tensors, demand), demand);
+    let steps = smoothed(&steps, tensors.columns, demand.sigma);
     let first = steps.iter().copied().min().unwrap_or(0);
     let last = steps.iter().copied().max().unwrap_or(0);
     let mut pixels = vec![0_u64; (last - first) as usize + 1];
-    for (place, step) in steps.iter().enumerate() {
+    for (place, &step) in steps.iter().enumerate() {
         pixels[(step - first) as usize] += pixels_of(target, place, tensors.columns);
     }
     let table = balanced(&pixels);
-    steps.iter().map(|step| table[(step - first) as usize]).collect()
+    steps.iter().map(|&step| table[(step - first) as usize]).collect()
+}
+
+/// How much detail is around each square, weighed; above 0, in a unit of its own.
+fn details(target: &Target, tensors: &Tensors, demand: &Demand<'_>) -> Vec<f64> {
+    // 1/256 of a step of the root is far below what noise does.
+    let steepness = |&trace: &i64| libm::rint(256.0 * (trace as f64).sqrt()) as i64;
+    let steepness: Vec<i64> = tensors.trace.iter().map(steepness).collect();
+    let steepness = smoothed(&steepness, tensors.columns, demand.sigma);
+    // Relative to the picture, so that its contrast does not matter.
+    let floor = mean(&steepness) / 16.0 + 1.0;
+    let mut details: Vec<f64> = steepness.iter().map(|&steepness| steepness as f64 + floor).collect();
+    if let Some(weights) = demand.weights {
+        let weights = smoothed(&mean_weights(target, weights, tensors.columns), tensors.columns, demand.sigma);
+        let mean = mean(&weights);
+        details.iter_mut().zip(&weights).for_each(|(detail, &weight)| *detail *= weight as f64 / mean);
+    }
+    details
+}
+
+/// The logarithm of the size that each detail asks for, from the middle one on, in [`STEPS_PER_OCTAVE`].
+fn steps(details: &[f64], demand: &Demand<'_>) -> Vec<i64> {
+    let factor = -f64::from(demand.strength_q8) / 256.0 / 3.0 * STEPS_PER_OCTAVE;
+    let reach = (STEPS_PER_OCTAVE * REACH_OCTAVES) as i64;
+    let mut steps: Vec<i64> = details.iter().map(|&detail| libm::rint(factor * libm::log2(detail)) as i64).collect();
+    let middle = libm::rint(mean(&steps)) as i64;
+    steps.iter_mut().for_each(|step| *step = (*step - middle).clamp(-reach, reach));
+    steps
+}
+
+fn mean(plane: &[i64]) -> f64 {
+    plane.iter().sum::<i64>() as f64 / plane.len() as f64
 }
 
 /// Pixels of the picture in the square at `place`: fewer at the border.
@@ -89,7 +106,7 @@ fn balanced(pixels: &[u64]) -> Vec<u32> {
         (0..pixels.len() as i32).map(size).collect::<Vec<_>>()
     };
     let fits = |shift: i32| {
-        let area = |size: u32| (f64::from(SIZE_ONE) / f64::from(size)).powi(2);
+        let area = |size: u32| f64::from(SIZE_ONE * SIZE_ONE) / f64::from(size * size);
         let sizes = sizes(shift);
         let tiles: f64 = sizes.iter().zip(pixels).map(|(&size, &pixels)| area(size) * pixels as f64).sum();
         tiles <= pixels.iter().sum::<u64>() as f64

@@ -29,6 +29,7 @@ mod shapes;
 mod snapshots;
 mod spirv;
 mod timelapse;
+mod transparency;
 mod vulkan;
 mod vulkan_failures;
 mod workshop;

@@ -4,8 +4,8 @@
 //! within the bounds of the rules; whether they are within their cell and an improvement is for the step to say.
 
 use super::random::{Chain, below};
-use super::rules::{Bounds, Rules};
-use crate::model::fly::{Fly, Z_MAX, position_max};
+use super::rules::{ASPECT_FREE_Q8, BirthDepth, Bounds, Rules, SEARCH_SIDE_MAX, STEP_FIRST};
+use crate::model::fly::{Fly, SIDE_MIN, Z_MAX, position_max};
 use crate::model::guide::GuideSample;
 use crate::model::tables::{cos_sin, normal_q8, size_factor_q16};
 
@@ -15,7 +15,7 @@ pub mod slot {
     pub const KIND: u32 = 0;
     /// Whether the child is recoloured.
     pub const RECOLOR: u32 = 1;
-    /// The numbers of the operator, eight.
+    /// The numbers of the operator, nine.
     pub const OPERATOR: u32 = 2;
     /// Pixels that compete for the place of a birth.
     pub const PLACE: u32 = 16;
@@ -34,6 +34,8 @@ const MOVE_SIDE_MAX: u32 = 138 * 64;
 pub struct Setting<'a> {
     /// The rules.
     pub rules: &'a Rules,
+    /// The own side of the fly, or of the one to be born.
+    pub own_side: u32,
     /// Size of the picture in px.
     pub size_px: (u32, u32),
 }
@@ -54,7 +56,7 @@ fn bell_step(amplitude_q8: i32, draws: Chain, slot: u32) -> i32 {
 /// The step of a move in 1/64 px with 8 fractional bits: d times the fly's step size.
 #[inline]
 fn move_q8(setting: &Setting<'_>, step: u32) -> i32 {
-    ((setting.rules.side.min(MOVE_SIDE_MAX) * step) >> 8) as i32
+    ((setting.own_side.min(MOVE_SIDE_MAX) * step) >> 8) as i32
 }
 
 impl Setting<'_> {
@@ -64,18 +66,17 @@ impl Setting<'_> {
     }
 }
 
-/// `fly` with its sides within the bounds at a place of this local size.
+/// `fly` with its sides within the bounds of a fly of this own side.
 #[inline]
 #[must_use]
-pub fn bounded(fly: &Fly, bounds: &Bounds, local: GuideSample) -> Fly {
-    let (mut low, mut high) = (bounds.side_min, bounds.side_max);
-    if bounds.local_size != 0 {
-        low = (low * local.size_q12) >> 12;
-        high = (high * local.size_q12) >> 12;
-    }
+pub fn bounded(fly: &Fly, bounds: &Bounds, own_side: u32) -> Fly {
+    let low = ((own_side * bounds.side_min_q8) >> 8).max(SIDE_MIN);
+    let high = ((own_side * bounds.side_max_q8) >> 8).clamp(low, SEARCH_SIDE_MAX);
     let (w, h) = (fly.w.clamp(low, high), fly.h.clamp(low, high));
-    let longest = |other: u32| if bounds.aspect_max_q8 >= 1 << 14 { high } else { (other * bounds.aspect_max_q8) >> 8 };
-    Fly { w: w.min(longest(h).max(low)), h: h.min(longest(w).max(low)), ..*fly }
+    let longest = |other: u32| {
+        if bounds.aspect_max_q8 >= ASPECT_FREE_Q8 { high } else { ((other * bounds.aspect_max_q8) >> 8).max(low) }
+    };
+    Fly { w: w.min(longest(h)), h: h.min(longest(w)), ..*fly }
 }
 
 /// One edge is moved along its normal; the opposite edge stays.
@@ -84,14 +85,17 @@ pub fn edge_moved(fly: &Fly, setting: &Setting<'_>, step: u32, draws: Chain) -> 
     let which = draws.bits(slot::OPERATOR) >> 30;
     let by = bell_step(move_q8(setting, step), draws, slot::OPERATOR + 1);
     let (cos, sin) = cos_sin(fly.angle);
-    let bounds = &setting.rules.bounds;
-    let moved = |side: u32| (side as i32 + by).clamp(bounds.side_min as i32, bounds.side_max as i32);
     let is_width = which & 1 == 0;
-    let side = moved(if is_width { fly.w } else { fly.h });
-    let by = side - (if is_width { fly.w } else { fly.h }) as i32;
+    let side = if is_width { fly.w } else { fly.h } as i32;
+    let child = if is_width {
+        Fly { w: (side + by).max(0) as u32, ..*fly }
+    } else {
+        Fly { h: (side + by).max(0) as u32, ..*fly }
+    };
+    let child = bounded(&child, &setting.rules.bounds, setting.own_side);
+    let by = if is_width { child.w } else { child.h } as i32 - side;
     let by = if which & 2 == 0 { by } else { -by };
     let (along_x, along_y) = if is_width { (cos, sin) } else { (-sin, cos) };
-    let child = if is_width { Fly { w: side as u32, ..*fly } } else { Fly { h: side as u32, ..*fly } };
     setting.moved_to(&child, fly.x + ((by * along_x + 4096) >> 13), fly.y + ((by * along_y + 4096) >> 13))
 }
 
@@ -165,8 +169,8 @@ pub fn newborn(setting: &Setting<'_>, (x, y): (u32, u32), shown_z: u32, local: G
     let angle = if follows { local.direction.wrapping_add(around as u16) } else { (bits >> 16) as u16 };
     let bits = draws.bits(slot::OPERATOR + 4);
     let z = match births.depth {
-        super::rules::BirthDepth::Front => shown_z.saturating_sub(1 + (bits >> 24)),
-        super::rules::BirthDepth::Random => bits >> 8,
+        BirthDepth::Front => shown_z.saturating_sub(1 + below(bits, setting.rules.depth_gap)),
+        BirthDepth::Random => bits >> 8,
     };
     let channel = |slot| (draws.bits(slot) >> 16) as u16;
     Fly {
@@ -177,9 +181,9 @@ pub fn newborn(setting: &Setting<'_>, (x, y): (u32, u32), shown_z: u32, local: G
         g: channel(slot::OPERATOR + 6),
         b: channel(slot::OPERATOR + 7),
         angle,
-        w: scaled(setting.rules.side, log_w),
-        h: scaled(setting.rules.side, log_h),
-        mask: 0,
+        w: scaled(setting.own_side, log_w),
+        h: scaled(setting.own_side, log_h),
+        mask: (setting.rules.mask_first + draws.below(slot::OPERATOR + 8, setting.rules.mask_count)) as u16,
         alive: true,
     }
 }
@@ -187,7 +191,7 @@ pub fn newborn(setting: &Setting<'_>, (x, y): (u32, u32), shown_z: u32, local: G
 /// A copy of a parent with a step in every gene: a birth as in the paper.
 #[must_use]
 pub fn mutant(parent: &Fly, setting: &Setting<'_>, draws: Chain) -> Fly {
-    let step = super::rules::STEP_FIRST;
+    let step = STEP_FIRST;
     let child = shifted(parent, setting, 2 * step, draws);
     let child = raised(&child, step, draws.then(1));
     repainted(&child, step, draws)

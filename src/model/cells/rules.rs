@@ -2,7 +2,8 @@
 //! bounds and penalties. The one place for these numbers; the ablation bench (`cargo bench --bench ablation`) shows what each of
 //! them is worth.
 
-use crate::model::fly::{SIDE_MIN, UNITS_PER_PX};
+use crate::model::fly::{UNITS_PER_PX, Z_MAX};
+use crate::model::guide::GuideSample;
 use crate::model::target::Rgb;
 use crate::model::tile::pack;
 
@@ -108,17 +109,28 @@ pub struct Births {
     pub coherence_range: u32,
 }
 
-/// What every fly obeys.
+/// What every fly obeys, relative to its own side ([`Rules::own_side`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Bounds {
-    /// Smallest side in 1/64 px.
-    pub side_min: u32,
-    /// Largest side in 1/64 px, at most [`SEARCH_SIDE_MAX`].
-    pub side_max: u32,
-    /// Largest ratio of the longer to the shorter side, over 256.
+    /// Smallest side over the own side, over 256.
+    pub side_min_q8: u32,
+    /// Largest side over the own side, over 256, at most [`SIDE_MAX_Q8`].
+    pub side_max_q8: u32,
+    /// Largest ratio of the longer to the shorter side, over 256; [`ASPECT_FREE_Q8`] or more is any.
     pub aspect_max_q8: u32,
-    /// Whether `side_min` and `side_max` are scaled by the guide's local size at the fly's centre (1) or not (0).
+    /// Whether own sides follow the guide's local size (1) or not (0).
     pub local_size: u32,
+}
+
+/// A part of the population with tiles of its own size: painters begin with a broad brush.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Class {
+    /// Flies with a smaller index belong to this class or to one before it.
+    pub end: u32,
+    /// Their own side over the mean side, over 4,096.
+    pub scale_q12: u32,
+    /// The first round in which absent flies of the class are dealt to cells.
+    pub first_round: u32,
 }
 
 /// What is added to the error, so that tiles lie as a style wants them.
@@ -158,6 +170,16 @@ pub struct Rules {
     pub bounds: Bounds,
     /// What is added to the error.
     pub penalties: Penalties,
+    /// Parts of the population, in the order of their flies; the last one ends where the population does.
+    pub classes: [Class; CLASSES_MAX],
+    /// How many classes there are, at least 1.
+    pub class_count: u32,
+    /// First of the mask layers of which newborn tiles wear one.
+    pub mask_first: u32,
+    /// How many such layers there are; all are equally likely. At least 1.
+    pub mask_count: u32,
+    /// Depth of a newborn tile in front of what shows: up to this.
+    pub depth_gap: u32,
     /// Colour behind all tiles, packed.
     pub background: u32,
     /// Width of the grout ring of every tile in 1/64 px; 0 is none.
@@ -166,16 +188,25 @@ pub struct Rules {
     pub grout_color: u32,
 }
 
+/// Largest of [`Bounds::side_max_q8`]: 16 own sides.
+pub const SIDE_MAX_Q8: u32 = 16 << 8;
+/// An aspect that bounds nothing.
+pub const ASPECT_FREE_Q8: u32 = 1 << 14;
+/// Most classes of a population.
+pub const CLASSES_MAX: usize = 4;
+/// Largest scale of a class: 8.
+pub const SCALE_MAX_Q12: u32 = 8 << 12;
 /// Most candidates of a step.
 pub const CANDIDATES_MAX: u32 = 64;
 
 impl Rules {
     /// The rules of the style `free` for tiles of the mean side `side` (1/64 px).
     #[must_use]
-    pub fn free(seed: u64, side: u32, background: Rgb) -> Self {
+    pub fn free(seed: u64, side: u32, fly_count: usize, background: Rgb) -> Self {
+        let everyone = Class { end: fly_count as u32, scale_q12: 1 << 12, first_round: 0 };
         Self {
             seed,
-            side,
+            side: side.min(SEARCH_SIDE_MAX),
             candidates: 1,
             steps_per_fly: 4,
             deal_tournament: 4,
@@ -202,16 +233,41 @@ impl Rules {
                 angle_spread: 65_536 / 36,
                 coherence_range: 128,
             },
-            bounds: Bounds {
-                side_min: SIDE_MIN,
-                side_max: (side * 8).min(SEARCH_SIDE_MAX),
-                aspect_max_q8: u32::MAX >> 18,
-                local_size: 0,
-            },
+            bounds: Bounds { side_min_q8: 1, side_max_q8: 8 << 8, aspect_max_q8: ASPECT_FREE_Q8, local_size: 0 },
             penalties: Penalties::default(),
+            classes: [everyone; CLASSES_MAX],
+            class_count: 1,
+            mask_first: 0,
+            mask_count: 1,
+            depth_gap: ((Z_MAX + 1) / (fly_count as u32).max(1)).clamp(1, 256),
             background: pack(background),
             grout: 0,
             grout_color: 0,
+        }
+    }
+}
+
+impl Rules {
+    /// The class of a fly.
+    #[inline]
+    #[must_use]
+    pub fn class_of(&self, fly: u32) -> &Class {
+        let last = self.class_count as usize - 1;
+        let place = self.classes[..last].iter().position(|class| fly < class.end).unwrap_or(last);
+        &self.classes[place]
+    }
+
+    /// The side that a fly's bounds, births and moves are measured in, in 1/64 px: that of its class, at a place of this
+    /// local size.
+    #[inline]
+    #[must_use]
+    pub fn own_side(&self, fly: u32, local: GuideSample) -> u32 {
+        // At most 2^16 * 2^15 and 2^16 * 2^14: 32 bits.
+        let side = ((self.side * self.class_of(fly).scale_q12) >> 12).min(SEARCH_SIDE_MAX);
+        if self.bounds.local_size == 0 {
+            side
+        } else {
+            ((side * local.size_q12.min(1 << 14)) >> 12).min(SEARCH_SIDE_MAX)
         }
     }
 }
