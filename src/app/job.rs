@@ -129,7 +129,7 @@ impl Job {
     pub(super) fn course(&self, cells: &CellsOptions) -> Course {
         let side = tile_side(self.target.width_px(), self.target.height_px(), self.fly_count);
         Course {
-            rules: cells.rules(side, self.background),
+            rules: cells.rules((side, self.fly_count), self.background),
             guide: Arc::new(guide::sharp(&self.target)),
             target: Arc::clone(&self.target),
             masks: Arc::new(self.masks()),

@@ -79,8 +79,8 @@ impl CellsOptions {
     }
 
     /// The rules for tiles of the mean side `side` (1/64 px).
-    pub(super) fn rules(&self, side: u32, background: Rgb) -> Rules {
-        Rules { candidates: self.candidates, color: self.color, ..Rules::free(self.seed, side, background) }
+    pub(super) fn rules(&self, (side, fly_count): (u32, usize), background: Rgb) -> Rules {
+        Rules { candidates: self.candidates, color: self.color, ..Rules::free(self.seed, side, fly_count, background) }
     }
 
     /// What decides the result beyond what does in every scheme.
