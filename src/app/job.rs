@@ -14,7 +14,7 @@ use crate::guide;
 use crate::model::cells::Course;
 use crate::model::operators::tile_side;
 use crate::model::target::weight_of_luma;
-use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
+use crate::model::{Backdrop, Fly, MaskSet, Population, Rgb, Scene, Target};
 use crate::photo::{self, Background, Loaded, Photo, ReadOptions};
 
 /// The inputs of one evolution, read and fitted together.
@@ -68,6 +68,8 @@ impl Job {
             memory::check(usual_bytes.saturating_add(memory::list_bytes(population)))?;
         }
         let fly_count = init.as_ref().map(|population| population.flies.len()).or(options.fly_count);
+        // Where nothing lies behind the tiles, an uncovered pixel counts as black.
+        let background = if target.transparent().is_some() { [0; 3] } else { background };
         Ok(Self {
             fly_count: fly_count.unwrap_or_else(|| default_fly_count(target.width_px(), target.height_px())),
             target: Arc::new(target),
@@ -91,10 +93,11 @@ impl Job {
 
     /// These flies as a population of this picture.
     pub(super) fn population(&self, flies: Vec<Fly>) -> Population {
+        let is_cut = self.target.transparent().is_some();
         Population {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
-            background: self.background.into(),
+            background: if is_cut { Backdrop::Transparent } else { self.background.into() },
             grout: None,
             masks: self.masks(),
             flies,
@@ -129,7 +132,7 @@ impl Job {
     pub(super) fn course(&self, cells: &CellsOptions) -> Course {
         let side = tile_side(self.target.width_px(), self.target.height_px(), self.fly_count);
         Course {
-            rules: cells.rules(side, self.background),
+            rules: cells.rules((side, self.fly_count), self.background),
             guide: Arc::new(guide::sharp(&self.target)),
             target: Arc::clone(&self.target),
             masks: Arc::new(self.masks()),

@@ -15,6 +15,7 @@ use super::scheme::ColorModeName;
 use super::values;
 use crate::error::{Error, Result};
 use crate::evolve::cells::{Budget, CELLS_VERSION, EVALS_PER_FLY};
+use crate::evolve::style::Style;
 use crate::model::Rgb;
 use crate::model::cells::Rules;
 use crate::model::cells::rules::{CANDIDATES_MAX, ColorSource};
@@ -49,6 +50,7 @@ pub(super) struct CellsOptions {
     patience: Option<u64>,
     candidates: u32,
     color: ColorSource,
+    style: Style,
 }
 
 impl CellsOptions {
@@ -66,6 +68,7 @@ impl CellsOptions {
             patience,
             candidates: in_range("--candidates", candidates, (1, u64::from(CANDIDATES_MAX)))? as u32,
             color: color_source(args)?,
+            style: Style::free(),
         })
     }
 
@@ -78,9 +81,10 @@ impl CellsOptions {
         }
     }
 
-    /// The rules for tiles of the mean side `side` (1/64 px).
-    pub(super) fn rules(&self, side: u32, background: Rgb) -> Rules {
-        Rules { candidates: self.candidates, color: self.color, ..Rules::free(self.seed, side, background) }
+    /// The rules for so many tiles of the mean side `side` (1/64 px).
+    pub(super) fn rules(&self, (side, fly_count): (u32, usize), background: Rgb) -> Rules {
+        let rules = self.style.rules(self.seed, (side, fly_count), background, background);
+        Rules { candidates: self.candidates, color: self.color, ..rules }
     }
 
     /// What decides the result beyond what does in every scheme.
