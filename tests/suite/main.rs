@@ -5,6 +5,7 @@
 
 mod canary;
 mod cli;
+mod cli_cells;
 mod cli_interrupts;
 mod cli_refusals;
 mod cli_scheme;
