@@ -12,7 +12,7 @@ use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
 use super::look::LookArgs;
 use super::paper::PaperArgs;
-use super::presets::{self, Preset};
+use super::presets::{self, PresetChoice};
 use super::render::RenderArgs;
 use super::scheme::{ColorModeName, PaperSchemeArgs};
 use super::score::ScoreArgs;
@@ -107,12 +107,13 @@ const EVOLVE_EXAMPLES: &str = "\
 Examples:
   smalti evolve photo.jpg -o mosaic.png
   smalti evolve photo.jpg -o mosaic.png -o flies.npz -n 10k --evals 20M
+  smalti evolve photo.jpg -o mosaic.png --style mosaic --grout auto -n 4000
   smalti evolve photo.jpg -o paper.png --scheme paper --births 200k --restarts 3 --cool 0.5
   smalti evolve photo.jpg -o poster.png --output-size 4096 --time 2m
   smalti evolve photo.jpg -o better.png --init flies.npz --seed 1
   smalti evolve photo.jpg -o - --quiet > mosaic.png";
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = EVOLVE_EXAMPLES)]
 pub(super) struct EvolveArgs {
     /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP, or the first frame of a GIF
@@ -179,9 +180,10 @@ pub(super) struct EvolveArgs {
     /// needs]
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Evolution")]
     pub scheme: Option<SchemeName>,
-    /// What other options begin from and change parts of: one of the paper's 12 schemes (Table 1), paper-1 to paper-12
-    #[arg(long, value_name = "NAME", value_parser = presets::parse, help_heading = "Evolution")]
-    pub preset: Option<Preset>,
+    /// What other options begin from and change parts of: one of the paper's 12 schemes (Table 1), paper-1 to paper-12; a
+    /// style; or a file of your own that ends in .toml
+    #[arg(long, value_name = "NAME|FILE", value_parser = presets::parse, help_heading = "Evolution")]
+    pub preset: Option<PresetChoice>,
     /// Where the colour of a new tile comes from [default: median, or evolved with --scheme paper]
     #[arg(long, value_enum, value_name = "MODE", help_heading = "Evolution")]
     pub color_mode: Option<ColorModeName>,

@@ -6,6 +6,7 @@
 mod canary;
 mod cells;
 mod cli;
+mod cli_cells;
 mod cli_interrupts;
 mod cli_refusals;
 mod cli_scheme;
