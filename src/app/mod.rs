@@ -3,6 +3,7 @@
 //! Only this module prints, reads the clock, the environment, or paths given by the user. Failures end as one sentence
 //! on stderr; stdout carries data only.
 
+mod bench;
 mod child;
 mod cli;
 mod computing;
@@ -51,5 +52,6 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
+        cli::Command::Bench(args) => bench::bench(args),
     }
 }
