@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use smalti::cpu::CpuEvaluator;
-use smalti::evolve::style::{GuideKind, Style};
+use smalti::evolve::cells::ROUNDS_PER_EPOCH;
+use smalti::evolve::style::{Ground, GuideKind, Style};
 use smalti::guide::{self, Flow};
 use smalti::model::cells::{Course, Search};
 use smalti::model::operators::tile_side;
@@ -14,8 +15,6 @@ use smalti::model::{Blend, Canvas, Evaluator, Grout, Guide, MaskSet, Mosaic, Pop
 use smalti::photo::{self, Photo, ReadOptions};
 use smalti::shapes::{Outfit, Shader, Template, Wardrobe};
 
-/// Rounds after which depths are spread evenly again.
-pub const ROUNDS_PER_EPOCH: u32 = 4;
 /// Names of the development pictures, in the order of the tables.
 pub const PICTURES: [&str; 5] = ["star", "yin_yang", "hats", "parrots", "woman"];
 
@@ -53,10 +52,12 @@ pub fn guide(target: &Target, style: &Style, side: u32) -> Guide {
     }
 }
 
-/// The course of a style by seed 0 on black, in the style's own masks, with grout in the picture's mean colour.
+/// The course of a style by seed 0 on its own ground, in the style's own masks, with grout in the picture's mean colour.
 pub fn course(target: &Arc<Target>, style: &Style, fly_count: usize, candidates: u32) -> Course {
     let side = tile_side(target.width_px(), target.height_px(), fly_count);
-    let mut rules = style.rules(0, (side, fly_count), [0; 3], mean_color(target));
+    let mean = mean_color(target);
+    let background = if style.ground == Ground::Black { [0; 3] } else { mean };
+    let mut rules = style.rules(0, (side, fly_count), background, mean);
     rules.candidates = candidates;
     let guide = Arc::new(guide(target, style, side));
     let mut masks = MaskSet::default();
@@ -89,7 +90,8 @@ pub fn draw(search: &mut dyn Search) -> Mosaic {
     CpuEvaluator::new(Vec::new()).draw(&population, &canvas, 1).expect("the CPU draws anything")
 }
 
-/// Makes rounds until so many children were evaluated, or until the objective is at most `enough`.
+/// Makes rounds until so many children were evaluated, or until the objective is at most `enough`. As the driver of searches
+/// does, but looks at both after every round: with eight candidates an epoch is a tenth of the budget.
 pub fn search_until(search: &mut dyn Search, evals: u64, enough: Option<i64>) {
     let is_done = |search: &dyn Search| {
         let standing = search.standing();

@@ -57,6 +57,13 @@ impl Timed {
     }
 }
 
+/// A search that is ready to begin.
+pub(super) struct OpenedSearch {
+    pub search: Box<dyn Search>,
+    /// What the validation layer says; complete once the search is gone.
+    pub validation_log: Option<Arc<ValidationLog>>,
+}
+
 /// Finds and opens the device that was asked for. Who leaves the choice to `auto` gets the CPU twin wherever Vulkan
 /// fails, since nobody asked for Vulkan; `--validate` asks for it.
 ///
@@ -153,11 +160,11 @@ impl Selected {
     ///
     /// # Errors
     /// [`Error::NoSuitableDevice`] if the device cannot search.
-    pub(super) fn open_search(&self, course: Course) -> Result<Box<dyn Search>> {
+    pub(super) fn open_search(&self, course: Course) -> Result<OpenedSearch> {
         match self {
-            Self::Cpu { .. } => Ok(Box::new(CpuSearch::new(course))),
+            Self::Cpu { .. } => Ok(OpenedSearch { search: Box::new(CpuSearch::new(course)), validation_log: None }),
             Self::Vulkan { device, .. } => {
-                let why = format!("{} cannot search in cells; use --device cpu", device.info().name);
+                let why = format!("{} cannot search in cells; use --device cpu or --scheme paper", device.info().name);
                 Err(Error::NoSuitableDevice { why })
             }
         }

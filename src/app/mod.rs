@@ -4,6 +4,7 @@
 //! on stderr; stdout carries data only.
 
 mod bench;
+mod cells;
 mod child;
 mod cli;
 mod computing;

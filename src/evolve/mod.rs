@@ -4,6 +4,7 @@
 //! file or a clock.
 
 mod breeder;
+pub mod cells;
 pub mod color;
 pub mod evolution;
 pub mod first;

@@ -15,9 +15,10 @@ use crate::app::report;
 use crate::cpu::cells::CpuSearch;
 use crate::engine::{Engine, Undisturbed};
 use crate::error::{Error, Result};
+use crate::evolve::cells::{self, Budget, EVALS_PER_FLY};
 use crate::evolve::evolution::random_population;
 use crate::evolve::style::Style;
-use crate::evolve::{Evolution, PaperScheme};
+use crate::evolve::{Evolution, PaperScheme, StopReason};
 use crate::model::cells::{Course, Search};
 use crate::model::tile::unpack;
 use crate::model::{Backdrop, Canvas, Fly, Grout, Population, Target};
@@ -30,10 +31,6 @@ const BATCH_BIRTHS: u32 = 50;
 const FORMING_ROUNDS: u32 = 8;
 /// Rounds of a lap with one candidate a step.
 const ROUNDS: u32 = 4;
-/// Rounds of a search between two looks at the clock.
-const ROUNDS_PER_EPOCH: u32 = 4;
-/// Evals for each tile of a whole run.
-const EVALS_PER_FLY: u64 = 400;
 
 /// What is measured of the search in cells: style, candidates, and which of the sizes.
 const SEARCHES: [(&str, u32, usize); 5] =
@@ -158,7 +155,7 @@ impl<'a> Bench<'a> {
     /// Makes rounds from the same population again and again.
     fn search(&mut self, name: String, course: Course, flies: &[Fly]) -> Result<()> {
         let rounds = (ROUNDS / course.rules.candidates).max(1);
-        let mut search = self.selected.open_search(course)?;
+        let mut search = self.selected.open_search(course)?.search;
         let laps = repeat(self.budget, || {
             search.load(flies)?;
             let began = Instant::now();
@@ -189,12 +186,10 @@ impl<'a> Bench<'a> {
         let began = Instant::now();
         let course = workload::course(target, &named("free")?, 1);
         let planned = EVALS_PER_FLY * course.fly_count as u64;
-        let mut search = self.selected.open_search(course)?;
+        let budget = Budget { evals: planned, target_sae: None, patience: None };
+        let mut search = self.selected.open_search(course)?.search;
         let (opened_s, searching) = (began.elapsed().as_secs_f64(), Instant::now());
-        while search.standing().evals < planned && (search.standing().evals == 0 || searching.elapsed() < self.budget) {
-            search.advance(ROUNDS_PER_EPOCH)?;
-            search.renormalise()?;
-        }
+        cells::run(&mut *search, None, &budget, &mut Limit { began: searching, time: self.budget })?;
         let searched_s = searching.elapsed().as_secs_f64();
         let whole_s = searched_s * (planned as f64 / search.standing().evals as f64).max(1.0);
         let drawing = Instant::now();
@@ -227,6 +222,18 @@ fn population(course: &Course, flies: Vec<Fly>) -> Population {
         grout: (rules.grout > 0).then(|| Grout { width: rules.grout, color: unpack(rules.grout_color) }),
         masks: masks.as_ref().clone(),
         flies,
+    }
+}
+
+/// Ends a search when its time is up.
+struct Limit {
+    began: Instant,
+    time: Duration,
+}
+
+impl cells::Observer for Limit {
+    fn after_epoch(&mut self, _search: &mut dyn Search) -> Result<Option<StopReason>> {
+        Ok((self.began.elapsed() >= self.time).then_some(StopReason::Time))
     }
 }
 

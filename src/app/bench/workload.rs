@@ -7,7 +7,7 @@ use crate::app::job::default_fly_count;
 use crate::app::options::Verbosity;
 use crate::app::report;
 use crate::error::{Error, Result};
-use crate::evolve::style::{GuideKind, Style};
+use crate::evolve::style::{Ground, GuideKind, Style};
 use crate::guide::{self, Flow};
 use crate::model::cells::Course;
 use crate::model::cells::random::hash;
@@ -17,8 +17,8 @@ use crate::photo::{self, Loaded, Photo, ReadOptions};
 
 /// Longer sides in px of the two sizes, as in Table 2 of the paper.
 pub(super) const SIDES_PX: [u32; 2] = [256, 512];
-/// Grout of the style `mosaic`.
-const GROUT: Rgb = [96; 3];
+/// Grout, and the ground of styles that take the picture's mean.
+const GREY: Rgb = [96; 3];
 
 /// A picture in both sizes.
 #[derive(Debug)]
@@ -98,7 +98,8 @@ pub(super) fn scene(target: &Arc<Target>) -> Scene {
 pub(super) fn course(target: &Arc<Target>, style: &Style, candidates: u32) -> Course {
     let fly_count = fly_count(target);
     let side = tile_side(target.width_px(), target.height_px(), fly_count);
-    let mut rules = style.rules(0, (side, fly_count), [0; 3], GROUT);
+    let background = if style.ground == Ground::Black { [0; 3] } else { GREY };
+    let mut rules = style.rules(0, (side, fly_count), background, GREY);
     rules.candidates = candidates;
     let guide = Arc::new(guide(target, style, side));
     Course { rules, target: Arc::clone(target), guide, masks: Arc::<MaskSet>::default(), fly_count }

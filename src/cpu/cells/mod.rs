@@ -4,6 +4,7 @@ mod area;
 mod block;
 mod cell;
 mod dressed;
+mod exchange;
 
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 

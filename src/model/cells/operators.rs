@@ -163,6 +163,7 @@ pub fn newborn(setting: &Setting<'_>, (x, y): (u32, u32), shown_z: u32, local: G
     let log_w = births.side_low + draws.below(slot::OPERATOR, range) as i32;
     let log_h = births.side_low + draws.below(slot::OPERATOR + 1, range) as i32;
     let log_h = log_h.clamp(log_w - births.aspect_high, log_w + births.aspect_high);
+    let (log_w, log_h) = if births.is_stroke == 0 { (log_w, log_h) } else { (log_w.max(log_h), log_w.min(log_h)) };
     let bits = draws.bits(slot::OPERATOR + 2);
     let follows = u32::from(local.coherence) >= below(bits << 16, births.coherence_range + 1);
     let around = (births.angle_spread as i32 * bell_q8(draws, slot::OPERATOR + 3) + 128) >> 8;

@@ -102,6 +102,8 @@ pub struct Births {
     pub side_high: i32,
     /// Largest ratio of the two sides, as a logarithm in steps of 1/256.
     pub aspect_high: i32,
+    /// Whether the longer side is the width, which lies along the guide's direction (1), or either (0).
+    pub is_stroke: u32,
     /// Standard deviation of the angle around the guide's direction, in 1/65536 of a turn.
     pub angle_spread: u32,
     /// Where the guide's coherence (0 to 255) is below a random number of 0 to this, the angle is random; 0 always follows
@@ -208,14 +210,14 @@ impl Rules {
             seed,
             side: side.min(SEARCH_SIDE_MAX),
             candidates: 1,
-            steps_per_fly: 4,
-            deal_tournament: 4,
+            steps_per_fly: 3,
+            deal_tournament: 2,
             color: ColorSource::Median,
             acceptance: Acceptance::Neutral,
             mix: Mix {
                 birth_q16: ONE_Q16 / 5,
-                recolor_q16: ONE_Q16 / 5,
-                edge: 60,
+                recolor_q16: ONE_Q16 / 2,
+                edge: 80,
                 turn: 10,
                 shift: 10,
                 depth: 2,
@@ -224,13 +226,14 @@ impl Rules {
             births: Births {
                 kind: BirthKind::Fresh,
                 depth: BirthDepth::Front,
-                place_tournament: 8,
-                victim_tournament: 32,
-                // 0.3 d to 6 d.
-                side_low: -308,
+                place_tournament: 16,
+                victim_tournament: 48,
+                // 0.08 d to 6 d.
+                side_low: -654,
                 side_high: 459,
                 aspect_high: 1024,
-                angle_spread: 65_536 / 36,
+                is_stroke: 0,
+                angle_spread: 400,
                 coherence_range: 128,
             },
             bounds: Bounds { side_min_q8: 1, side_max_q8: 8 << 8, aspect_max_q8: ASPECT_FREE_Q8, local_size: 0 },
