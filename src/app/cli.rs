@@ -7,6 +7,7 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
+use super::bench::BenchArgs;
 use super::cells::CellsArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
@@ -101,6 +102,8 @@ pub(super) enum Command {
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed with
     /// numpy, scipy and scikit-image. Of an animation the first frame is measured.
     Score(ScoreArgs),
+    /// Measure how fast this machine evolves pictures
+    Bench(BenchArgs),
 }
 
 const EVOLVE_EXAMPLES: &str = "\

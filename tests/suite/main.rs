@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "test names are sentences; only code that others call needs docs")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test that it is in")]
 
+mod bench;
 mod canary;
 mod cells;
 mod cli;
