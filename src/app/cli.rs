@@ -165,7 +165,8 @@ pub(super) struct EvolveArgs {
     /// Palette that picture and tiles are held to: .gpl, .pal, .hex (lines of RRGGBB), or the colours of a picture
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     pub palette: Option<PathBuf>,
-    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: black, or as in --init]
+    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: as in --init or the style, or
+    /// black; what is transparent stays so, but not with --scheme paper]
     #[arg(long, value_name = "COLOR", value_parser = values::color, help_heading = "Picture")]
     pub background: Option<Rgb>,
     /// Map that tells where likeness matters, a picture with the proportions of IN: an error counts 16 times as much where

@@ -50,7 +50,8 @@ impl Job {
     pub(super) fn load(options: &EvolveOptions) -> Result<Self> {
         let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
         let of_init = init.as_ref().map(|population| population.background.color());
-        let background = options.background.or(of_init).unwrap_or_default();
+        let asked_for = options.background.or(of_init);
+        let background = asked_for.unwrap_or_default();
         let behind = if keeps_transparency(options) { Background::Transparent } else { Background::Color(background) };
         let reading = ReadOptions { background: behind, long_side_px: Some(options.long_side_px) };
         let Picture { target, palette, original_size_px, sha256, warnings } =
@@ -68,12 +69,16 @@ impl Job {
             memory::check(usual_bytes.saturating_add(memory::list_bytes(population)))?;
         }
         let fly_count = init.as_ref().map(|population| population.flies.len()).or(options.fly_count);
-        // Where nothing lies behind the tiles, an uncovered pixel counts as black.
-        let background = if target.transparent().is_some() { [0; 3] } else { background };
         let fly_count = fly_count.unwrap_or_else(|| default_fly_count(target.width_px(), target.height_px()));
         let grout = match &options.scheme {
             SchemeOptions::Cells(cells) => cells.grout(&target, fly_count),
             SchemeOptions::Paper(_) => None,
+        };
+        let background = match &options.scheme {
+            // Where nothing lies behind the tiles, an uncovered pixel counts as black.
+            SchemeOptions::Cells(_) if target.transparent().is_some() => [0; 3],
+            SchemeOptions::Cells(cells) if asked_for.is_none() => cells.ground(&target, grout),
+            _ => background,
         };
         let job = Self {
             fly_count,

@@ -67,12 +67,12 @@ impl GroutChoice {
             Some(GroutColor::This(color)) => color,
             _ => mean_color(target),
         };
-        Some(Grout { width: self.width.unwrap_or_else(|| (side * usual_q8 >> 8).max(1)), color })
+        Some(Grout { width: self.width.unwrap_or_else(|| ((side * usual_q8) >> 8).max(1)), color })
     }
 }
 
 /// The mean colour where tiles are wanted, rounded half up: grout in it keeps the brightness of the whole.
-fn mean_color(target: &Target) -> Rgb {
+pub(super) fn mean_color(target: &Target) -> Rgb {
     let is_wanted = |place: usize| target.transparent().is_none_or(|transparent| !transparent[place]);
     let (mut sums, mut count) = ([0_u64; 3], 0_u64);
     for (_, color) in target.pixels().iter().enumerate().filter(|&(place, _)| is_wanted(place)) {

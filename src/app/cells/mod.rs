@@ -21,7 +21,7 @@ use super::scheme::ColorModeName;
 use super::values;
 use crate::error::{Error, Result};
 use crate::evolve::cells::{Budget, CELLS_VERSION, EVALS_PER_FLY};
-use crate::evolve::style::{GuideKind, Style};
+use crate::evolve::style::{Ground, GuideKind, Style};
 use crate::guide::{self, Flow};
 use crate::model::cells::Rules;
 use crate::model::cells::rules::{CANDIDATES_MAX, ColorSource};
@@ -124,6 +124,15 @@ impl CellsOptions {
         self.grout.of(self.style.grout_q8, side_of(target, fly_count), target)
     }
 
+    /// The colour behind the tiles, unless one is asked for.
+    pub(super) fn ground(&self, target: &Target, grout: Option<Grout>) -> Rgb {
+        match (self.style.ground, grout) {
+            (Ground::Grout, Some(grout)) => grout.color,
+            (Ground::Black | Ground::Grout, _) => [0; 3],
+            (Ground::Mean, _) => grout::mean_color(target),
+        }
+    }
+
     /// The rules for a job whose flies wear the mask layers from `layers.0` on, `layers.1` of them.
     pub(super) fn rules(&self, job: &Job, layers: (u32, u32)) -> Rules {
         let side = side_of(&job.target, job.fly_count);
@@ -145,7 +154,7 @@ impl CellsOptions {
             GuideKind::Edges => guide::sharp(target),
             GuideKind::Flow { smoothing_q8, size_strength_q8 } => {
                 let tile_side = side_of(target, fly_count);
-                let smoothing = (u64::from(tile_side) * u64::from(smoothing_q8) >> 8) as u32;
+                let smoothing = ((u64::from(tile_side) * u64::from(smoothing_q8)) >> 8) as u32;
                 guide::flowing(target, &Flow { tile_side, smoothing, size_strength_q8, weights: target.weights() })
             }
         }
@@ -194,7 +203,8 @@ fn side_of(target: &Target, fly_count: usize) -> u32 {
     tile_side(target.width_px(), target.height_px(), fly_count)
 }
 
-/// The numbers of a style, so that another number is another key.
+/// The numbers of a style, so that another number is another key; what it says of grout, ground and masks is told as it
+/// came out.
 fn style_told(style: &Style) -> Value {
     let classes: Vec<[u32; 3]> =
         style.classes.iter().map(|class| [class.share_q16, class.scale_q8, class.first_round]).collect();
@@ -206,6 +216,7 @@ fn style_told(style: &Style) -> Value {
         "side_q8": [style.side_min_q8, style.side_max_q8],
         "aspect_q8": style.aspect_max_q8,
         "birth_side_q8": [style.birth_min_q8, style.birth_max_q8],
+        "is_stroke": style.is_stroke,
         "overlap": style.overlap,
         "hole": style.hole,
         "turn": style.turn,

@@ -14,7 +14,7 @@ use crate::app::presets;
 use crate::app::scheme::ColorModeName;
 use crate::app::values;
 use crate::error::{Error, Result};
-use crate::evolve::style::{ClassStyle, GuideKind, Style};
+use crate::evolve::style::{ClassStyle, Ground, GuideKind, Style};
 use crate::model::cells::rules::CLASSES_MAX;
 
 /// Fixed-point one of lengths over d.
@@ -40,6 +40,8 @@ pub(in crate::app) struct PresetFile {
     side: Option<[Length; 2]>,
     aspect: Option<Aspect>,
     birth_side: Option<[Length; 2]>,
+    stroke: Option<bool>,
+    ground: Option<GroundName>,
     overlap: Option<Cost>,
     hole: Option<Cost>,
     turn: Option<Cost>,
@@ -66,6 +68,14 @@ struct ClassFile {
 enum GuideName {
     Edges,
     Flow,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum GroundName {
+    Black,
+    Mean,
+    Grout,
 }
 
 /// What a flag of the command line takes as text; none if the file does not tell it.
@@ -245,6 +255,13 @@ impl PresetFile {
         set(&mut style.angle_spread, self.angle_spread_deg.map(|spread| spread.0));
         set(&mut style.coherence, self.coherence.map(u32::from));
         set(&mut style.grout_q8, self.grout_width.map(|width| width.0));
+        style.is_stroke = self.stroke.unwrap_or(style.is_stroke);
+        style.ground = match self.ground {
+            Some(GroundName::Black) => Ground::Black,
+            Some(GroundName::Mean) => Ground::Mean,
+            Some(GroundName::Grout) => Ground::Grout,
+            None => style.ground,
+        };
         let flow = match style.guide {
             GuideKind::Flow { smoothing_q8, size_strength_q8 } => (smoothing_q8, size_strength_q8),
             GuideKind::Edges => (ONE_Q8 as u32, 0),
