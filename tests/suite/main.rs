@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test that it is in")]
 
 mod canary;
+mod cells_vulkan;
 mod cli;
 mod cli_interrupts;
 mod cli_refusals;
