@@ -14,6 +14,8 @@
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const uint BLOCK_SIDE = 8u;
 layout(constant_id = 2) const uint SAMPLES_PER_THREAD = 8u;
+// 1: nothing lies behind the tiles, and the highest byte of a colour is its opacity.
+layout(constant_id = 3) const uint TRANSPARENT = 0u;
 
 struct ComposeItem {
     int x;
@@ -72,7 +74,8 @@ void main() {
         if ((item.flags & FLAG_UNFINISHED) != 0u) {
             states[sample_in_block] = uvec4(samples[s].transmittance, samples[s].sums);
         } else {
-            colors[item.first_sample + sample_in_block] = shown_over(samples[s], push.background);
+            colors[item.first_sample + sample_in_block] =
+                TRANSPARENT == 1u ? shown_alone(samples[s]) : shown_over(samples[s], push.background);
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Populations as OpenRaster files (`.ora`): the mosaic in depth bands, each a layer with alpha, over the background.
+//! Populations as OpenRaster files (`.ora`): the mosaic in depth bands, each a layer with alpha, over the background, which a
+//! transparent picture does not have.
 //!
 //! A band is drawn by an [`Evaluator`] over black and over white; what differs is its transparency. Dates, order and
 //! compression are fixed: the same population gives the same bytes. The format: <https://www.openraster.org>.
@@ -12,8 +13,8 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use crate::error::{Error, Result};
 use crate::model::blocks::{depth_order, index_of};
-use crate::model::{Canvas, Evaluator, Fly, Mosaic, Population, Rgb};
-use crate::photo::{self, Metadata, Photo};
+use crate::model::{Backdrop, Canvas, Evaluator, Fly, Mosaic, Population, Rgb};
+use crate::photo::{self, Format, Metadata, Photo};
 
 /// Depth bands of a file, if nobody asks for another number.
 pub const BAND_COUNT: usize = 8;
@@ -32,7 +33,7 @@ const METADATA_BYTES: u64 = 1 << 20;
 pub struct Layers {
     width_px: u32,
     height_px: u32,
-    /// Names and PNG files of the layers, the background first.
+    /// Names and PNG files of the layers, the background first if there is one.
     layers: Vec<(String, Vec<u8>)>,
     thumbnail: Vec<u8>,
 }
@@ -55,14 +56,20 @@ impl Layers {
     ) -> Result<Self> {
         let Canvas { width_px, height_px, .. } = *canvas;
         let pixel_count = width_px as usize * height_px as usize;
-        let [r, g, b] = population.background;
-        let background =
-            photo::encode_png_with_alpha(width_px, height_px, &vec![[r, g, b, 255]; pixel_count], &Metadata::new())?;
-        let mut layers = vec![("Background".to_owned(), background)];
+        let mut layers = Vec::new();
+        if let Backdrop::Color([r, g, b]) = population.background {
+            let background = photo::encode_png_with_alpha(
+                width_px,
+                height_px,
+                &vec![[r, g, b, 255]; pixel_count],
+                &Metadata::new(),
+            )?;
+            layers.push(("Background".to_owned(), background));
+        }
         let bands = bands(&population.flies, band_count);
         for (number, flies) in (1..).zip(&bands) {
             let mut over = |background: Rgb| {
-                let (masks, flies) = (population.masks.clone(), flies.clone());
+                let (background, masks, flies) = (background.into(), population.masks.clone(), flies.clone());
                 let band = Population { background, masks, flies, ..*population };
                 evaluator.draw(&band, canvas, supersampling)
             };
@@ -75,9 +82,11 @@ impl Layers {
             Canvas::scaled(population.width_px, population.height_px, THUMBNAIL_SIDE_PX.min(width_px.max(height_px)));
         let supersampling =
             if thumbnail.width_px.max(thumbnail.height_px) == longest { 1 } else { THUMBNAIL_SUPERSAMPLING };
-        let Mosaic { width_px: w, height_px: h, pixels } = evaluator.draw(population, &thumbnail, supersampling)?;
+        let Mosaic { width_px: w, height_px: h, pixels, alpha } =
+            evaluator.draw(population, &thumbnail, supersampling)?;
         let thumbnail = Photo { width_px: w, height_px: h, pixels };
-        Ok(Self { width_px, height_px, layers, thumbnail: photo::encode_png(&thumbnail, &Metadata::new())? })
+        let thumbnail = photo::encode_with_alpha(Format::Png, &thumbnail, alpha.as_deref(), &Metadata::new())?;
+        Ok(Self { width_px, height_px, layers, thumbnail })
     }
 }
 
@@ -203,7 +212,7 @@ mod tests {
         for alpha in [0, 1, 128, 254, 255_u32] {
             let over = |background: u32| {
                 let channel = |color: u32| ((color * alpha + background * (255 - alpha) + 127) / 255) as u8;
-                Mosaic { width_px: 1, height_px: 1, pixels: vec![[200, 0, 255].map(channel)] }
+                Mosaic { width_px: 1, height_px: 1, pixels: vec![[200, 0, 255].map(channel)], alpha: None }
             };
             let found = cut_out(&over(0), &over(255));
             let expected = if alpha == 0 { [0; 3] } else { [200, 0, 255] };

@@ -7,13 +7,14 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
+use super::cells::CellsArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
 use super::look::LookArgs;
 use super::paper::PaperArgs;
 use super::presets::{self, Preset};
 use super::render::RenderArgs;
-use super::scheme::SchemeArgs;
+use super::scheme::{ColorModeName, PaperSchemeArgs};
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
 use super::values::ColorCount;
@@ -77,8 +78,7 @@ fn command_typed() -> String {
 pub(super) enum Command {
     /// Evolve one picture into a mosaic
     ///
-    /// Thousands of coloured tiles are bred, one death and one birth at a time, until together they look like the
-    /// picture. The same picture, options and seed give the same bytes on every device.
+    /// Thousands of coloured tiles are bred, child by child, until together they look like the picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
     /// Draw a population again, at any size, or write it in another format
     ///
@@ -106,7 +106,8 @@ pub(super) enum Command {
 const EVOLVE_EXAMPLES: &str = "\
 Examples:
   smalti evolve photo.jpg -o mosaic.png
-  smalti evolve photo.jpg -o mosaic.png -o flies.npz -n 10k --births 200k --restarts 3 --cool 0.5
+  smalti evolve photo.jpg -o mosaic.png -o flies.npz -n 10k --evals 20M
+  smalti evolve photo.jpg -o paper.png --scheme paper --births 200k --restarts 3 --cool 0.5
   smalti evolve photo.jpg -o poster.png --output-size 4096 --time 2m
   smalti evolve photo.jpg -o better.png --init flies.npz --seed 1
   smalti evolve photo.jpg -o - --quiet > mosaic.png";
@@ -128,13 +129,14 @@ pub(super) struct EvolveArgs {
     /// Also write the picture that was evolved towards, fitted to size, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
-    /// Also write how the error fell, birth by birth, as a table (.csv) or a plot (.svg); may repeat
+    /// Also write how the error fell as a table (.csv) or a plot (.svg); may repeat
     #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
     pub curves: Vec<PathBuf>,
     /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub save_run: Option<PathBuf>,
-    /// Most births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 100th of all]
+    /// Most evals or births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a 100th
+    /// of all]
     #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
     pub save_every: Option<u64>,
     /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
@@ -172,45 +174,34 @@ pub(super) struct EvolveArgs {
 
     #[command(flatten)]
     pub look: LookArgs,
-    /// Masks that all tiles change to at the first restart [default: none, or as in --preset]
-    #[arg(long = "restart-mask", value_name = "NAME|FILE", value_delimiter = ',', help_heading = "Tiles")]
-    pub restart_masks: Vec<PathBuf>,
 
-    /// One of the paper's 12 schemes (Table 1), paper-1 to paper-12; other options change parts of it
+    /// How to evolve: `cells` comes closest by far, `paper` is the published Fly algorithm [default: cells, or as --preset
+    /// needs]
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Evolution")]
+    pub scheme: Option<SchemeName>,
+    /// What other options begin from and change parts of: one of the paper's 12 schemes (Table 1), paper-1 to paper-12
     #[arg(long, value_name = "NAME", value_parser = presets::parse, help_heading = "Evolution")]
     pub preset: Option<Preset>,
-    /// How to evolve; `paper` is the published Fly algorithm
-    #[arg(long, value_enum, value_name = "NAME", default_value = "paper", help_heading = "Evolution")]
-    pub scheme: SchemeName,
-    /// Births of each run (suffixes k, M) [default: 40k]
-    #[arg(long, value_name = "B", value_parser = values::count, help_heading = "Evolution")]
-    pub births: Option<u64>,
-    /// Births evaluated together, 1 to N; more is faster on a GPU, 1 is the published algorithm
-    #[arg(long, value_name = "K", value_parser = values::count, default_value = "1", help_heading = "Evolution")]
-    pub batch_births: u64,
-    /// Further runs, each from the best population so far, 0 to 1,000,000 [default: 0, or as in --preset]
-    #[arg(long, value_name = "R", value_parser = values::count, help_heading = "Evolution")]
-    pub restarts: Option<u64>,
-    /// Factor of all mutation steps at each restart, 0.00001 to 1
-    #[arg(long, value_name = "F", value_parser = values::number, default_value_t = 1.0, help_heading = "Evolution")]
-    pub cool: f64,
-    /// What to do when no bad tile is found: take the worse of two, begin the next run, or stop
-    #[arg(long, value_enum, value_name = "ACTION", default_value = "fallback", help_heading = "Evolution")]
-    pub on_dry: OnDryName,
-    /// End a run after this many births without improvement, at least 1 (suffixes k, M) [default: never]
-    #[arg(long, value_name = "B", value_parser = values::count, help_heading = "Evolution")]
-    pub patience: Option<u64>,
+    /// Where the colour of a new tile comes from [default: median, or evolved with --scheme paper]
+    #[arg(long, value_enum, value_name = "MODE", help_heading = "Evolution")]
+    pub color_mode: Option<ColorModeName>,
     /// Stop once the sum of absolute errors is at most this (suffixes k, M) [default: never]
     #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Evolution")]
     pub target_sae: Option<u64>,
-    /// Stop after this time even if births are left: 90, 30s, 2m, 1h30m [default: never]
+    /// Stop after this many evals in which the error fell by less than a thousandth, at least 1 (suffixes k, M); with
+    /// --scheme paper, end a run after this many births without improvement [default: never]
+    #[arg(long, value_name = "E", value_parser = values::count, help_heading = "Evolution")]
+    pub patience: Option<u64>,
+    /// Stop after this time even if evals are left: 90, 30s, 2m, 1h30m [default: never]
     #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Evolution")]
     pub time: Option<Duration>,
     /// Number that decides every random choice
     #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0, help_heading = "Evolution")]
     pub seed: u64,
     #[command(flatten)]
-    pub variation: SchemeArgs,
+    pub cells: CellsArgs,
+    #[command(flatten)]
+    pub paper: PaperSchemeArgs,
 
     #[command(flatten)]
     pub computing: ComputingArgs,
@@ -238,14 +229,18 @@ pub(super) struct DevicesArgs {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum SchemeName {
+    Cells,
     Paper,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum OnDryName {
-    Fallback,
-    Restart,
-    Stop,
+impl SchemeName {
+    /// The word for flags, results and metadata.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Cells => "cells",
+            Self::Paper => "paper",
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

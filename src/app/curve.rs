@@ -1,5 +1,6 @@
 //! The curve of an evolution (paper Fig. 5): global fitness and spread over births, with the restarts.
 
+use super::curve_file::Tabled;
 use crate::engine::Observer;
 use crate::error::Result;
 use crate::evolve::{Evolution, Spread, StopReason};
@@ -66,9 +67,10 @@ impl Curve {
         let every_run = (evolution.restarts_planned() / POINTS as u32).max(1);
         self.next_run = (run / every_run + 1) * every_run;
     }
+}
 
-    /// The points as CSV; every row ends with the `status` of the evolution and the first digits of the result's `key`.
-    pub(super) fn csv(&self, status: &str, key: &str) -> String {
+impl Tabled for Curve {
+    fn csv(&self, status: &str, key: &str) -> String {
         let mut text = String::from(CSV_HEADER);
         for point in &self.points {
             let Point { run, births_in_run, births, sae, best_sae, spread, .. } = point;
@@ -81,11 +83,7 @@ impl Curve {
         text
     }
 
-    /// The points as a plot.
-    ///
-    /// # Errors
-    /// If there are none.
-    pub(super) fn plot(&self, title: String) -> Result<String> {
+    fn plot(&self, title: String) -> Result<String> {
         let line = |label: &str, value: fn(&Point) -> u64| Series {
             label: label.to_owned(),
             points: self.points.iter().map(|point| (point.births as f64, value(point) as f64)).collect(),

@@ -8,17 +8,29 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::curve::{CSV_HEADER, Curve};
 use super::destination::{self, Destination};
 use super::interrupt::Interrupt;
 use super::options::Overwrite;
 use super::report::Status;
+use super::{cells, curve};
 use crate::archive::KEY_DIGITS;
 use crate::error::{Error, Result};
 use crate::output;
 
 /// Most bytes of a file that are looked at to see whether it is a curve: many times what one has.
 const BYTES_MAX: u64 = 1 << 24;
+
+/// A curve, whatever it is of.
+pub(super) trait Tabled {
+    /// The points as CSV; every row ends with the `status` of the evolution and the first digits of the result's `key`.
+    fn csv(&self, status: &str, key: &str) -> String;
+
+    /// The points as a plot.
+    ///
+    /// # Errors
+    /// If there are none.
+    fn plot(&self, title: String) -> Result<String>;
+}
 
 /// What is written to the file of a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,7 +65,7 @@ impl CurveFile {
     }
 
     /// What this curve is in this form.
-    fn encode(&self, curve: &Curve, title: &str, (key, status): (&str, Status)) -> Result<Vec<u8>> {
+    fn encode(&self, curve: &dyn Tabled, title: &str, (key, status): (&str, Status)) -> Result<Vec<u8>> {
         let end = self.form.end(key, status);
         match self.form {
             Form::Csv => Ok(curve.csv(word(status), short(key)).into_bytes()),
@@ -88,7 +100,7 @@ impl CurveFile {
         let text = self.found().unwrap_or_default();
         let last_line = text.lines().next_back().unwrap_or_default();
         let is_curve = match self.form {
-            Form::Csv => text.starts_with(CSV_HEADER),
+            Form::Csv => [curve::CSV_HEADER, cells::CSV_HEADER].iter().any(|header| text.starts_with(header)),
             Form::Svg => last_line.starts_with(SVG_END),
         };
         let mut ends = [Status::Complete, Status::Partial].into_iter().map(|status| self.form.end(key, status));
@@ -133,7 +145,7 @@ pub(super) fn check_writable<'a>(
 /// The first failure; the files after it are written nevertheless.
 pub(super) fn write(
     files: &[&CurveFile],
-    (curve, title): (&Curve, &str),
+    (curve, title): (&dyn Tabled, &str),
     told: (&str, Status),
     interrupt: &mut Interrupt,
     written: &mut Vec<String>,

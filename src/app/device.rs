@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use crate::cpu::CpuEvaluator;
+use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
 use crate::gpu::GpuEvaluator;
+use crate::model::cells::{Course, Search};
 use crate::model::{Evaluator, Scene};
 use crate::vk::{
     Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, ValidationLog, choose,
@@ -25,6 +27,13 @@ pub(super) enum Selected {
 pub(super) struct Opened {
     pub evaluator: Box<dyn Evaluator>,
     /// What the validation layer says; complete once the evaluator is gone.
+    pub validation_log: Option<Arc<ValidationLog>>,
+}
+
+/// A search that is ready to begin.
+pub(super) struct OpenedSearch {
+    pub search: Box<dyn Search>,
+    /// What the validation layer says; complete once the search is gone.
     pub validation_log: Option<Arc<ValidationLog>>,
 }
 
@@ -94,6 +103,20 @@ impl Selected {
             Self::Vulkan { device, validation_log } => {
                 let evaluator = Box::new(GpuEvaluator::create(device, scenes)?);
                 Ok(Opened { evaluator, validation_log: Some(Arc::clone(validation_log)) })
+            }
+        }
+    }
+
+    /// A search in cells on this device, which begins with absent flies.
+    ///
+    /// # Errors
+    /// [`Error::NoSuitableDevice`] if the device cannot search.
+    pub(super) fn open_search(&self, course: Course) -> Result<OpenedSearch> {
+        match self {
+            Self::Cpu { .. } => Ok(OpenedSearch { search: Box::new(CpuSearch::new(course)), validation_log: None }),
+            Self::Vulkan { device, .. } => {
+                let why = format!("{} cannot search in cells; use --device cpu or --scheme paper", device.info().name);
+                Err(Error::NoSuitableDevice { why })
             }
         }
     }

@@ -3,13 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::cli::SchemeName;
+use super::cells::CellsOptions;
 use super::look::Dress;
 use super::memory;
-use super::options::{Colors, EvolveOptions};
+use super::options::{Colors, EvolveOptions, SchemeOptions};
 use crate::archive;
 use crate::error::{Error, Result};
 use crate::evolve::{Palette, PaperScheme, begin_from, first_population};
+use crate::guide;
+use crate::model::cells::Course;
+use crate::model::operators::tile_side;
 use crate::model::target::weight_of_luma;
 use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
 use crate::photo::{self, Background, Loaded, Photo, ReadOptions};
@@ -26,8 +29,10 @@ pub(super) struct Job {
     pub warnings: Vec<String>,
     pub background: Rgb,
     pub fly_count: usize,
-    /// The scheme with what depends on files: the masks that flies wear, and the palette of their colours.
-    pub scheme: PaperScheme,
+    /// The scheme with what depends on files: in the paper's, the masks that flies wear and the palette of their colours.
+    pub scheme: SchemeOptions,
+    /// Colours that the tiles are held to, if they are.
+    pub palette: Option<Palette>,
     /// How many colours the target was reduced to, if it was.
     pub color_count: Option<usize>,
     /// The masks that were asked for; none leaves the flies as they are, which is square unless `init` says otherwise.
@@ -44,18 +49,18 @@ impl Job {
     /// lists of the population do not fit into memory.
     pub(super) fn load(options: &EvolveOptions) -> Result<Self> {
         let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
-        let of_init = init.as_ref().map(|population| population.background);
+        let of_init = init.as_ref().map(|population| population.background.color());
         let background = options.background.or(of_init).unwrap_or_default();
         let behind = if keeps_transparency(options) { Background::Transparent } else { Background::Color(background) };
         let reading = ReadOptions { background: behind, long_side_px: Some(options.long_side_px) };
         let Picture { target, palette, original_size_px, sha256, warnings } =
             Picture::read(&options.input, &reading, &options.colors, options.weight.as_deref())?;
         let dress = dress(options, init.as_ref())?;
+        let palette = palette.map(Palette::new).transpose()?;
         let mut scheme = options.scheme.clone();
-        if let Some(dress) = &dress {
-            scheme.masks.clone_from(&dress.layers_by_run);
+        if let SchemeOptions::Paper(scheme) = &mut scheme {
+            *scheme = fitted_out(scheme.clone(), dress.as_ref(), palette.as_ref());
         }
-        scheme.color.palette = palette.map(Palette::new).transpose()?;
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
             let pixel_count = u64::from(target.width_px()) * u64::from(target.height_px());
@@ -71,6 +76,7 @@ impl Job {
             warnings,
             background,
             scheme,
+            palette,
             color_count: if let Colors::Few(count) = options.colors { Some(count) } else { None },
             dress,
             init,
@@ -88,7 +94,7 @@ impl Job {
         Population {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
-            background: self.background,
+            background: self.background.into(),
             grout: None,
             masks: self.masks(),
             flies,
@@ -105,11 +111,40 @@ impl Job {
         }
     }
 
-    /// The flies to begin with.
-    pub(super) fn first_flies(&self) -> Vec<Fly> {
-        let random = || first_population(&self.scheme, &self.target, self.fly_count);
-        self.init.as_ref().map_or_else(random, |population| begin_from(&self.scheme, population.flies.clone()))
+    /// The flies that an evolution by the paper's `scheme` begins with.
+    pub(super) fn first_flies(&self, scheme: &PaperScheme) -> Vec<Fly> {
+        let random = || first_population(scheme, &self.target, self.fly_count);
+        self.init.as_ref().map_or_else(random, |population| begin_from(scheme, population.flies.clone()))
     }
+
+    /// The flies that a search begins with, if not with none, held to what was asked for.
+    pub(super) fn given_flies(&self, seed: u64) -> Option<Vec<Fly>> {
+        let population = self.init.as_ref()?;
+        let scheme = PaperScheme { seed, ..PaperScheme::default() };
+        let scheme = fitted_out(scheme, self.dress.as_ref(), self.palette.as_ref());
+        Some(begin_from(&scheme, population.flies.clone()))
+    }
+
+    /// What a search in cells goes by.
+    pub(super) fn course(&self, cells: &CellsOptions) -> Course {
+        let side = tile_side(self.target.width_px(), self.target.height_px(), self.fly_count);
+        Course {
+            rules: cells.rules((side, self.fly_count), self.background),
+            guide: Arc::new(guide::sharp(&self.target)),
+            target: Arc::clone(&self.target),
+            masks: Arc::new(self.masks()),
+            fly_count: self.fly_count,
+        }
+    }
+}
+
+/// A scheme whose flies wear these masks and are held to this palette.
+fn fitted_out(mut scheme: PaperScheme, dress: Option<&Dress>, palette: Option<&Palette>) -> PaperScheme {
+    if let Some(dress) = dress {
+        scheme.masks.clone_from(&dress.layers_by_run);
+    }
+    scheme.color.palette = palette.cloned();
+    scheme
 }
 
 /// The masks that were asked for, unless they are those that flies wear anyway.
@@ -126,10 +161,7 @@ fn dress(options: &EvolveOptions, init: Option<&Population>) -> Result<Option<Dr
 /// Whether transparent pixels of the picture stay so: the paper knows only opaque pictures, and a background that was
 /// asked for is meant to show.
 fn keeps_transparency(options: &EvolveOptions) -> bool {
-    let scheme_knows_it = match options.scheme_name {
-        SchemeName::Paper => false,
-    };
-    scheme_knows_it && options.background.is_none()
+    matches!(options.scheme, SchemeOptions::Cells(_)) && options.background.is_none()
 }
 
 /// The target, and what is worth knowing about the file that it is from.
@@ -305,9 +337,9 @@ pub(super) mod tests {
     #[test]
     fn the_papers_scheme_shows_transparent_pixels_on_the_background() {
         let (_folder, path) = folder();
-        let (_, job) = plan(&path("cut.png"), &[]);
+        let (_, job) = plan(&path("cut.png"), &["--scheme", "paper"]);
         assert_eq!((job.target.transparent(), job.target.pixels()[3]), (None, [0, 4, 0]));
-        let (_, job) = plan(&path("cut.png"), &["--background", "ffffff"]);
+        let (_, job) = plan(&path("cut.png"), &["--scheme", "paper", "--background", "ffffff"]);
         assert_eq!((job.target.transparent(), job.target.pixels()[3]), (None, [128, 132, 128]));
     }
 

@@ -1,7 +1,7 @@
 //! Whether the work fits into memory, found out before it begins.
 
 use crate::error::{Error, Result};
-use crate::model::{Canvas, Population, Tile};
+use crate::model::{Backdrop, Canvas, Population, Tile};
 
 // The first two are about twice what the CPU twin takes for a random population of 50,000 flies at 4096x4096, and of
 // 1,000,000 at 512x512, since lists grow while tiles gather.
@@ -11,6 +11,8 @@ const BYTES_PER_PIXEL: u64 = 40;
 const BYTES_PER_FLY: u64 = 512;
 /// Bytes per pixel of the written picture: the mosaic, the encoder's copy, and the encoded file.
 const BYTES_PER_OUTPUT_PIXEL: u64 = 10;
+/// What alpha adds to that: its byte, pixels of four channels for the encoder, and the file's fourth channel.
+const BYTES_PER_ALPHA: u64 = 6;
 
 /// Bytes per block that a tile touches: an entry of 8 in a list that grows by doubling.
 const BYTES_PER_ENTRY: u64 = 16;
@@ -35,7 +37,8 @@ pub(super) fn drawing_bytes(population: &Population, samples: &Canvas, pixel_cou
     let tiles = population.flies.iter().map(|fly| Tile::bake(fly, samples)).filter(|tile| !tile.is_empty());
     let entries: u64 = tiles.map(|tile| patches(tile.x0, tile.x1) * patches(tile.y0, tile.y1)).sum();
     let fly_bytes = population.flies.len() as u64 * BYTES_PER_FLY;
-    entries * BYTES_PER_ENTRY + fly_bytes + pixel_count.saturating_mul(BYTES_PER_OUTPUT_PIXEL)
+    let alpha_bytes = if population.background == Backdrop::Transparent { BYTES_PER_ALPHA } else { 0 };
+    entries * BYTES_PER_ENTRY + fly_bytes + pixel_count.saturating_mul(BYTES_PER_OUTPUT_PIXEL + alpha_bytes)
 }
 
 /// About how many bytes an evolution needs.
@@ -100,12 +103,22 @@ mod tests {
         let population = Population {
             width_px: 2048,
             height_px: 2048,
-            background: [0; 3],
+            background: [0; 3].into(),
             grout: None,
             masks: MaskSet::default(),
             flies,
         };
         assert_eq!(list_bytes(&population), 3000 * 256 * 256 * 16);
+    }
+
+    #[test]
+    fn a_transparent_picture_takes_six_bytes_a_pixel_more() {
+        let population = |background| {
+            let (masks, flies) = (MaskSet::default(), vec![Fly::ABSENT; 2]);
+            Population { width_px: 9, height_px: 9, background, grout: None, masks, flies }
+        };
+        let bytes = |background| drawing_bytes(&population(background), &Canvas::evaluation(9, 9), 81);
+        assert_eq!(bytes(Backdrop::Transparent) - bytes(Backdrop::Color([0; 3])), 6 * 81);
     }
 
     #[test]

@@ -4,26 +4,21 @@ use std::iter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::cli::{EvolveArgs, OnDryName, ProgressKind, SchemeName};
+use super::cells::CellsOptions;
+use super::cli::{EvolveArgs, ProgressKind, SchemeName};
 use super::computing::Computing;
 use super::curve_file::CurveFile;
 use super::destination::{self, Destination};
 use super::look::Look;
-use super::presets::Preset;
+use super::scheme;
 use super::snapshots::SaveRun;
 use super::values::ColorCount;
 use crate::error::{Error, Result};
-use crate::evolve::scheme::PAPER_BIRTHS;
-use crate::evolve::{OnDry, PaperScheme};
+use crate::evolve::PaperScheme;
 use crate::model::Rgb;
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::vk::Validation;
-
-/// Most restarts of one evolution.
-const RESTARTS_MAX: u64 = 1_000_000;
-/// Least factor of the mutation steps: it is kept in 65,536ths and must not become 0.
-const COOL_MIN: f64 = 0.00001;
 
 /// What to do about outputs that exist already and are not what the same command would write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +52,22 @@ pub(super) enum Colors {
     Palette(PathBuf),
 }
 
+/// How to evolve.
+#[derive(Clone, Debug)]
+pub(super) enum SchemeOptions {
+    Cells(CellsOptions),
+    Paper(PaperScheme),
+}
+
+impl SchemeOptions {
+    fn new(args: &EvolveArgs) -> Result<Self> {
+        match scheme_name(args) {
+            SchemeName::Cells => CellsOptions::new(args).map(Self::Cells),
+            SchemeName::Paper => scheme::paper_scheme(args, args.preset).map(Self::Paper),
+        }
+    }
+}
+
 /// Longer side in px that pictures are reduced to.
 const LONG_SIDE_PX: u64 = 512;
 
@@ -85,8 +96,7 @@ pub(super) struct EvolveOptions {
     /// `None` means the one of `init`, else black.
     pub background: Option<Rgb>,
     pub init: Option<PathBuf>,
-    pub scheme_name: SchemeName,
-    pub scheme: PaperScheme,
+    pub scheme: SchemeOptions,
     pub time_limit: Option<Duration>,
     pub computing: Computing,
     pub progress: ProgressKind,
@@ -116,18 +126,18 @@ impl EvolveOptions {
             long_side_px: side_px("--size", args.size.unwrap_or(preset_side.unwrap_or(LONG_SIDE_PX)))?,
             colors: colors(args),
             weight: args.weight.clone(),
-            look: Look::new(&args.look, &args.restart_masks, args.preset)?,
+            look: Look::new(&args.look, &args.paper.restart_masks, args.preset)?,
             background: args.background,
             init: args.init.clone(),
-            scheme_name: args.scheme,
-            scheme: scheme(args)?,
+            scheme: SchemeOptions::new(args)?,
             time_limit: args.time,
             computing: args.computing.check(validation)?,
             progress: args.progress.unless(args.quiet),
             verbosity: verbosity(args),
         };
-        if options.look.changes_at_restart() && options.scheme.restarts == 0 {
-            let sentence = if args.restart_masks.is_empty() {
+        let restarts = if let SchemeOptions::Paper(scheme) = &options.scheme { scheme.restarts } else { 0 };
+        if options.look.changes_at_restart() && restarts == 0 {
+            let sentence = if args.paper.restart_masks.is_empty() {
                 "this preset changes its masks at a restart; drop --restarts 0"
             } else {
                 "--restart-mask needs a restart; add --restarts"
@@ -175,46 +185,27 @@ fn colors(args: &EvolveArgs) -> Colors {
     }
 }
 
-/// Refuses flags that the scheme has no use for.
-fn check_scheme_knows(args: &EvolveArgs) -> Result<()> {
-    match args.scheme {
-        SchemeName::Paper if args.weight.is_some() => {
-            let sentence = "--weight: the paper's scheme weighs all pixels alike; use --scheme cells";
-            Err(Error::Usage(sentence.to_owned()))
-        }
-        SchemeName::Paper => Ok(()),
-    }
+/// The scheme that was asked for, by name or by what needs it.
+pub(super) fn scheme_name(args: &EvolveArgs) -> SchemeName {
+    args.scheme.unwrap_or(if args.preset.is_some() { SchemeName::Paper } else { SchemeName::Cells })
 }
 
-fn scheme(args: &EvolveArgs) -> Result<PaperScheme> {
-    let SchemeName::Paper = args.scheme;
-    let batch_births = in_range("--batch-births", args.batch_births, (1, FLY_COUNT_MAX as u64))?;
-    let of_preset = args.preset.map_or(0, |preset| u64::from(preset.restarts()));
-    let restarts = in_range("--restarts", args.restarts.unwrap_or(of_preset), (0, RESTARTS_MAX))?;
-    let patience = args.patience.map(|births| in_range("--patience", births, (1, u64::MAX))).transpose()?;
-    let cool_q16 = (args.cool * 65_536.0).round();
-    if !(COOL_MIN..=1.0).contains(&args.cool) {
-        return Err(Error::Usage(format!("--cool {}: must be {COOL_MIN} to 1", args.cool)));
-    }
-    if cool_q16 < 65_536.0 && restarts == 0 {
-        return Err(Error::Usage("--cool changes only the runs after the first; add --restarts".to_owned()));
-    }
-    let scheme = PaperScheme {
-        seed: args.seed,
-        births: args.births.unwrap_or(args.preset.map_or(PAPER_BIRTHS, Preset::births)),
-        restarts: restarts as u32,
-        cool_q16: cool_q16 as u32,
-        on_dry: match args.on_dry {
-            OnDryName::Fallback => OnDry::Fallback,
-            OnDryName::Restart => OnDry::Restart,
-            OnDryName::Stop => OnDry::Stop,
-        },
-        patience,
-        target_sae: args.target_sae,
-        batch_births: batch_births as u32,
-        ..PaperScheme::default()
+/// Refuses flags that the scheme has no use for.
+fn check_scheme_knows(args: &EvolveArgs) -> Result<()> {
+    let (other, given) = match scheme_name(args) {
+        SchemeName::Paper if args.weight.is_some() => {
+            let sentence = "--weight: the paper's scheme weighs all pixels alike; use --scheme cells";
+            return Err(Error::Usage(sentence.to_owned()));
+        }
+        SchemeName::Paper => (SchemeName::Cells, args.cells.given()),
+        SchemeName::Cells => (SchemeName::Paper, args.paper.given().or(args.preset.map(|_| "--preset paper-N"))),
     };
-    args.variation.apply(scheme, args.init.is_some())
+    given.map_or(Ok(()), |flag| {
+        let (other, this) = (other.word(), scheme_name(args).word());
+        Err(Error::Usage(format!(
+            "{flag}: only --scheme {other} has it, and this is --scheme {this}; drop one of them"
+        )))
+    })
 }
 
 fn verbosity(args: &EvolveArgs) -> Verbosity {

@@ -118,10 +118,14 @@ pub(super) struct EncodedFile<'a> {
 /// If one of them cannot hold the result.
 pub(super) fn encode<'a>(outputs: &[&'a Destination], drawn: Drawn, told: &Told) -> Result<Vec<EncodedFile<'a>>> {
     let Drawn { population, marginal, view, picture, layers } = drawn;
-    let photo = picture.map(|Mosaic { width_px, height_px, pixels }| Photo { width_px, height_px, pixels });
+    let photo =
+        picture.map(|Mosaic { width_px, height_px, pixels, alpha }| (Photo { width_px, height_px, pixels }, alpha));
     let metadata = provenance::picture_metadata(&told.picture);
     let undrawn = || Error::Internal("an output was not drawn".to_owned());
-    let encode_picture = |format| photo::encode(format, photo.as_ref().ok_or_else(undrawn)?, &metadata);
+    let encode_picture = |format| {
+        let (photo, alpha) = photo.as_ref().ok_or_else(undrawn)?;
+        photo::encode_with_alpha(format, photo, alpha.as_deref(), &metadata)
+    };
     let encode_one = |&destination: &&'a Destination| {
         let bytes = match destination.content {
             Content::Png => encode_picture(Format::Png),

@@ -26,12 +26,24 @@ pub(super) trait Stage {
 pub(super) struct Standing {
     /// Time since it began.
     pub elapsed: Duration,
-    pub births: u64,
-    pub births_planned: u64,
-    /// Global fitness of the best population.
-    pub sae: u64,
+    /// What is counted: births or evals.
+    pub unit: &'static str,
+    pub count: u64,
+    pub planned: u64,
+    /// What `error` is: the SAE, or the objective of a search.
+    pub measure: Measure,
+    /// Of the best population.
+    pub error: u64,
     /// Time after which it is ended.
     pub time_limit: Option<Duration>,
+}
+
+/// What an evolution lowers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Measure {
+    Sae,
+    /// The SAE with weights and penalties.
+    Objective,
 }
 
 /// Shows where an evolution stands.
@@ -106,17 +118,17 @@ impl Form {
 }
 
 impl Standing {
-    fn births_per_s(&self) -> f64 {
-        self.births as f64 / self.elapsed.as_secs_f64().max(1e-9)
+    fn per_s(&self) -> f64 {
+        self.count as f64 / self.elapsed.as_secs_f64().max(1e-9)
     }
 
-    /// Seconds left: until all births are made, or the time is up. Unknown before the first birth without a time limit.
+    /// Seconds left: until all is done, or the time is up. Unknown before the first count without a time limit.
     fn eta_s(&self) -> Option<f64> {
-        let births_left = self.births_planned.saturating_sub(self.births);
-        let is_known = births_left == 0 || self.births > 0;
-        let by_births = is_known.then(|| births_left as f64 / self.births_per_s().max(1e-9));
+        let left = self.planned.saturating_sub(self.count);
+        let is_known = left == 0 || self.count > 0;
+        let by_count = is_known.then(|| left as f64 / self.per_s().max(1e-9));
         let by_time = self.time_limit.map(|limit| limit.saturating_sub(self.elapsed).as_secs_f64());
-        by_births.into_iter().chain(by_time).reduce(f64::min)
+        by_count.into_iter().chain(by_time).reduce(f64::min)
     }
 }
 
@@ -132,22 +144,32 @@ impl Stage for Standing {
 
     fn line(&self) -> String {
         let left = self.eta_s().map(|eta_s| format!(", {} left", short_time(eta_s))).unwrap_or_default();
+        let unit = self.unit;
+        let measure = match self.measure {
+            Measure::Sae => "SAE",
+            Measure::Objective => "objective",
+        };
         format!(
-            "{}/{} births, SAE {}, {} births/s{left}",
-            HumanCount(self.births),
-            HumanCount(self.births_planned),
-            HumanCount(self.sae),
-            HumanCount(self.births_per_s() as u64)
+            "{}/{} {unit}, {measure} {}, {} {unit}/s{left}",
+            HumanCount(self.count),
+            HumanCount(self.planned),
+            HumanCount(self.error),
+            HumanCount(self.per_s() as u64)
         )
     }
 
     fn json_line(&self) -> String {
         let rounded = |value: f64| (value * 10.0).round() / 10.0;
+        let unit = self.unit;
+        let measure = match self.measure {
+            Measure::Sae => "sae",
+            Measure::Objective => "objective",
+        };
         let mut line = json!({
-            "births": self.births,
-            "births_planned": self.births_planned,
-            "sae": self.sae,
-            "births_per_s": rounded(self.births_per_s()),
+            unit: self.count,
+            format!("{unit}_planned"): self.planned,
+            measure: self.error,
+            format!("{unit}_per_s"): rounded(self.per_s()),
             "elapsed_s": rounded(self.elapsed.as_secs_f64()),
         });
         if let Some(eta_s) = self.eta_s() {
@@ -179,12 +201,15 @@ mod tests {
 
     fn standing() -> Standing {
         let elapsed = Duration::from_secs(10);
-        Standing { elapsed, births: 1_000, births_planned: 4_000, sae: 1_234_567, time_limit: None }
+        let (count, planned, error) = (1_000, 4_000, 1_234_567);
+        Standing { elapsed, unit: "births", count, planned, measure: Measure::Sae, error, time_limit: None }
     }
 
     #[test]
     fn a_plain_line_tells_births_fitness_rate_and_time_left() {
         assert_eq!(standing().line(), "1,000/4,000 births, SAE 1,234,567, 100 births/s, 30s left");
+        let searching = Standing { unit: "evals", measure: Measure::Objective, ..standing() };
+        assert_eq!(searching.line(), "1,000/4,000 evals, objective 1,234,567, 100 evals/s, 30s left");
     }
 
     #[test]
@@ -198,7 +223,7 @@ mod tests {
 
     #[test]
     fn before_the_first_birth_the_time_left_is_left_out() {
-        let idle = Standing { births: 0, ..standing() };
+        let idle = Standing { count: 0, ..standing() };
         assert_eq!(idle.line(), "0/4,000 births, SAE 1,234,567, 0 births/s");
         assert!(!idle.json_line().contains("eta_s"), "{}", idle.json_line());
         assert_eq!(Standing { time_limit: Some(Duration::from_secs(15)), ..idle }.eta_s(), Some(5.0));

@@ -8,13 +8,14 @@ use sha2::{Digest, Sha256};
 
 use super::destination::{Content, Destination};
 use super::job::Job;
-use super::options::EvolveOptions;
+use super::options::{EvolveOptions, SchemeOptions};
 use super::outputs::Told;
 use super::report::Status;
 use super::scheme;
 use crate::archive;
 use crate::error::Result;
-use crate::evolve::{ALGORITHM_VERSION, Evolution, OnDry, Outcome, StopReason};
+use crate::evolve::{ALGORITHM_VERSION, Evolution, Outcome, StopReason};
+use crate::model::cells::Standing;
 use crate::model::{Blend, MaskSet, Population};
 use crate::openraster;
 use crate::photo::{self, Metadata};
@@ -25,7 +26,7 @@ pub(super) const SOFTWARE: &str = "smalti";
 /// Keyword of the text chunk or comment that holds the metadata as JSON.
 pub(super) const KEYWORD: &str = "smalti";
 /// What the header of a population file already tells.
-const HEADER_KEYS: [&str; 5] = ["width_px", "height_px", "background", "blend", "grout"];
+const HEADER_KEYS: [&str; 6] = ["width_px", "height_px", "background", "transparent", "blend", "grout"];
 
 /// Everything that decides a result.
 #[derive(Clone, Debug)]
@@ -40,21 +41,35 @@ pub(super) struct Ending {
     pub status: Status,
     pub stop: StopReason,
     pub sae: u64,
-    pub outcome: Outcome,
-    pub births_in_last_run: u64,
+    pub course: Course,
+}
+
+/// What an evolution counted on its way.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Course {
+    Paper { outcome: Outcome, births_in_last_run: u64 },
+    Cells(Standing),
 }
 
 impl Ending {
+    /// The ending for this reason, with this SAE.
+    pub(super) fn new(stop: StopReason, sae: u64, course: Course) -> Self {
+        let status = if stop == StopReason::Interrupted { Status::Partial } else { Status::Complete };
+        Self { status, stop, sae, course }
+    }
+
     /// How `evolution`, which has ended, ended.
     pub(super) fn of(evolution: &Evolution) -> Self {
+        let (outcome, births_in_last_run) = (evolution.outcome(), evolution.births_in_run());
         let stop = evolution.stop_reason().unwrap_or(StopReason::Births);
-        let status = if stop == StopReason::Interrupted { Status::Partial } else { Status::Complete };
-        Self {
-            status,
-            stop,
-            sae: evolution.best_sae().unwrap_or_default(),
-            outcome: evolution.outcome(),
-            births_in_last_run: evolution.births_in_run(),
+        Self::new(stop, evolution.best_sae().unwrap_or_default(), Course::Paper { outcome, births_in_last_run })
+    }
+
+    /// What was to be lowered, and the number of restarts before it came so low.
+    fn lowered(&self) -> (i64, u64) {
+        match self.course {
+            Course::Paper { outcome, .. } => (self.sae as i64, u64::from(outcome.restarts)),
+            Course::Cells(standing) => (standing.objective, 0),
         }
     }
 }
@@ -100,26 +115,19 @@ impl Provenances {
 impl Provenance {
     /// What decides a mosaic.
     fn of_mosaic(options: &EvolveOptions, job: &Job, target_sha256: &str, resized_px: Option<u32>) -> Self {
-        let scheme = &job.scheme;
         let mut specific = json!({
             "content": "mosaic",
             "algorithm": ALGORITHM_VERSION,
             "tiles": job.fly_count,
             "init_sha256": job.init.as_ref().map(population_sha256),
-            "scheme": "paper",
-            "seed": scheme.seed,
-            "births_per_run": scheme.births,
-            "batch_births": scheme.batch_births,
-            "restarts": scheme.restarts,
-            "cool_q16": scheme.cool_q16,
-            "on_dry": on_dry_name(scheme.on_dry),
-            "patience": scheme.patience,
-            "target_sae": scheme.target_sae,
             "time_ms": options.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
             "output_size_px": resized_px,
         });
         if let Value::Object(specific) = &mut specific {
-            specific.extend(scheme::decisive(scheme));
+            specific.extend(match &job.scheme {
+                SchemeOptions::Paper(scheme) => scheme::decisive(scheme),
+                SchemeOptions::Cells(cells) => cells.decisive(job),
+            });
             if let Some(dress) = &job.dress {
                 specific.insert("masks_sha256".to_owned(), masks_sha256(&dress.masks).into());
             }
@@ -176,17 +184,33 @@ impl Provenance {
         told.insert("software".to_owned(), SOFTWARE.into());
         told.insert("version".to_owned(), env!("CARGO_PKG_VERSION").into());
         told.insert("key".to_owned(), self.key.clone().into());
-        if let Some(Ending { status, stop, sae, outcome, births_in_last_run }) = ending {
+        if let Some(Ending { status, stop, sae, course }) = ending {
             told.insert("status".to_owned(), json!(status));
             told.insert("stop".to_owned(), stop.word().into());
             told.insert("sae".to_owned(), (*sae).into());
-            told.insert("births".to_owned(), outcome.births.into());
-            told.insert("births_in_last_run".to_owned(), (*births_in_last_run).into());
-            told.insert("fallback_kills".to_owned(), outcome.fallback_kills.into());
-            told.insert("restarts_made".to_owned(), outcome.restarts.into());
+            told.extend(course.describe());
         }
         told.sort_keys();
         told
+    }
+}
+
+impl Course {
+    fn describe(&self) -> impl Iterator<Item = (String, Value)> {
+        let told = match self {
+            Self::Paper { outcome, births_in_last_run } => vec![
+                ("births", json!(outcome.births)),
+                ("births_in_last_run", json!(births_in_last_run)),
+                ("fallback_kills", json!(outcome.fallback_kills)),
+                ("restarts_made", json!(outcome.restarts)),
+            ],
+            Self::Cells(standing) => vec![
+                ("objective", json!(standing.objective)),
+                ("evals", json!(standing.evals)),
+                ("births", json!(standing.births)),
+            ],
+        };
+        told.into_iter().map(|(word, value)| (word.to_owned(), value))
     }
 }
 
@@ -209,9 +233,9 @@ pub(super) struct Story {
     pub key: String,
     /// Whether its evolution came to its end.
     pub is_complete: bool,
-    /// None for a fitted picture.
-    pub sae: Option<u64>,
-    /// None for a fitted picture.
+    /// What its evolution was to lower, as far as that came: the objective, or else the SAE; none for a fitted picture.
+    pub lowered: Option<i64>,
+    /// None for a fitted picture, and for a search in cells.
     pub restarts_made: Option<u64>,
 }
 
@@ -223,15 +247,15 @@ impl Story {
 
     /// Whether the file should stay rather than make room for a result with the same key that ended like `ending`.
     ///
-    /// Both are cut from one course of births, so the one of a later run got farther, and within a run the one of the lower
-    /// SAE. SAEs of different runs tell nothing: masks may have changed between them, or tiles split.
+    /// Both are cut from one course, so the one of a later run got farther, and within a run the one of the lower SAE or
+    /// objective. SAEs of different runs tell nothing: masks may have changed between them, or tiles split.
     pub(super) fn is_better_than(&self, ending: &Ending) -> bool {
         let new_is_complete = ending.status == Status::Complete;
         if self.is_complete != new_is_complete {
             return self.is_complete;
         }
-        let (old_runs, new_runs) = (self.restarts_made.unwrap_or_default(), u64::from(ending.outcome.restarts));
-        old_runs > new_runs || old_runs == new_runs && self.sae.is_some_and(|sae| sae < ending.sae)
+        let (old_runs, (new, new_runs)) = (self.restarts_made.unwrap_or_default(), ending.lowered());
+        old_runs > new_runs || old_runs == new_runs && self.lowered.is_some_and(|old| old < new)
     }
 }
 
@@ -252,20 +276,13 @@ pub(super) fn story_of_file(destination: &Destination) -> Option<Story> {
     let number = |key| told.get(key).and_then(Value::as_u64);
     // An unknown word is a result that somebody may want to keep.
     let is_complete = text("status") != Some("partial");
-    Some(Story { key, is_complete, sae: number("sae"), restarts_made: number("restarts_made") })
+    let lowered = told.get("objective").or(told.get("sae")).and_then(Value::as_i64);
+    Some(Story { key, is_complete, lowered, restarts_made: number("restarts_made") })
 }
 
 fn picture_description(metadata: Result<Metadata>) -> Result<Option<Map<String, Value>>> {
     let told = metadata?.into_iter().find(|(keyword, _)| keyword == KEYWORD);
     Ok(told.and_then(|(_, text)| serde_json::from_str(&text).ok()))
-}
-
-fn on_dry_name(on_dry: OnDry) -> &'static str {
-    match on_dry {
-        OnDry::Fallback => "fallback",
-        OnDry::Restart => "restart",
-        OnDry::Stop => "stop",
-    }
 }
 
 /// SHA-256 over what evolves from a population: its flies and masks, whatever file held them.
@@ -349,13 +366,12 @@ mod tests {
             status,
             stop: StopReason::Time,
             sae,
-            outcome: Outcome { restarts, ..Outcome::default() },
-            births_in_last_run: 0,
+            course: Course::Paper { outcome: Outcome { restarts, ..Outcome::default() }, births_in_last_run: 0 },
         };
         let story = |is_complete, restarts_made, sae| Story {
             key: String::new(),
             is_complete,
-            sae: Some(sae),
+            lowered: Some(sae),
             restarts_made: Some(restarts_made),
         };
         for (is_complete, old, status, new, stays) in [

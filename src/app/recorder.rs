@@ -1,6 +1,6 @@
 //! Keeps the course of an evolution: snapshots of its best population, encoded and written while it goes on.
 //!
-//! Births alone decide when a snapshot is taken, never the clock, so the same command leaves the same files on every
+//! Evals, which are births in the paper's scheme, decide when a snapshot is taken, never the clock, so the same command leaves the same files on every
 //! machine. A thread of its own encodes and writes; the evolution copies its flies and waits only if that thread falls
 //! behind, so memory stays flat.
 
@@ -8,27 +8,28 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 
-use serde_json::{Map, Value};
+use serde_json::{Map, Value, json};
 
 use super::snapshots::SaveRun;
 use crate::archive;
 use crate::error::{Error, Result};
-use crate::evolve::Evolution;
+use crate::evolve::{Evolution, cells};
+use crate::model::cells::{Search, Standing};
 use crate::model::{Fly, Population};
 use crate::output;
 
 /// Snapshots that may wait to be written.
 const QUEUE_LENGTH: usize = 2;
-/// The first snapshots lie this share of their births apart: the picture changes fastest at the beginning.
+/// The first snapshots lie this share of their evals apart: the picture changes fastest at the beginning.
 const EARLY_SHARE: u64 = 32;
-/// And at least this share of the births between later ones.
+/// And at least this share of the evals between later ones.
 const EARLY_LEAST_SHARE: u64 = 64;
 
 /// A population that the evolution passed through.
 struct Passed {
-    births: u64,
-    run: u32,
-    sae: u64,
+    evals: u64,
+    /// What its snapshot alone tells.
+    told: Map<String, Value>,
     flies: Vec<Fly>,
 }
 
@@ -36,11 +37,11 @@ struct Passed {
 #[derive(Debug)]
 pub(super) struct Recorder {
     save_run: SaveRun,
-    /// Births between two snapshots, but at the beginning.
+    /// Evals between two snapshots, but at the beginning.
     every: u64,
-    /// Births from which the next one is due.
+    /// Evals from which the next one is due.
     due: u64,
-    /// Births of the last one.
+    /// Evals of the last one.
     last: Option<u64>,
     /// Run of the last generation.
     run: u32,
@@ -58,7 +59,7 @@ impl Recorder {
     /// [`Error::Output`] if the folder cannot be made ready.
     pub(super) fn begin(
         save_run: &SaveRun,
-        births_planned: u64,
+        evals_planned: u64,
         stage: Population,
         told: Map<String, Value>,
     ) -> Result<Self> {
@@ -68,7 +69,7 @@ impl Recorder {
         let writer = std::thread::Builder::new().name("snapshots".to_owned()).spawn(move || {
             let (mut population, mut made) = (stage, Vec::new());
             let written = passed.into_iter().try_for_each(|passed| {
-                let path = writing.path_of(passed.births);
+                let path = writing.path_of(passed.evals);
                 let is_new = !path.exists();
                 write(&path, &mut population, &told, passed)?;
                 made.extend(is_new.then_some(path));
@@ -81,7 +82,7 @@ impl Recorder {
         })?;
         Ok(Self {
             save_run: save_run.clone(),
-            every: save_run.births_between(births_planned),
+            every: save_run.evals_between(evals_planned),
             due: 0,
             last: None,
             run: 0,
@@ -101,9 +102,36 @@ impl Recorder {
         self.run = outcome.restarts;
     }
 
+    /// Looks at a search after a round, and takes a snapshot if one is due.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(super) fn note_search(&mut self, search: &mut dyn Search) -> Result<()> {
+        let evals = search.standing().evals;
+        if evals < self.due {
+            return Ok(());
+        }
+        self.due = next_due(evals, self.every);
+        self.take_search(search)
+    }
+
     /// Takes the last snapshot and waits until all are written.
     pub(super) fn finish(&mut self, evolution: &Evolution) {
         self.take(evolution);
+        self.close();
+    }
+
+    /// As [`Recorder::finish`], of a search.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(super) fn finish_search(&mut self, search: &mut dyn Search) -> Result<()> {
+        let taken = self.take_search(search);
+        self.close();
+        taken
+    }
+
+    fn close(&mut self) {
         self.queue = None;
         if let Some(writer) = self.writer.take() {
             let ended = |_| Err(Error::Internal("the thread that writes snapshots ended".to_owned()));
@@ -125,19 +153,39 @@ impl Recorder {
         if self.last.replace(births) == Some(births) {
             return;
         }
-        let sae = evolution.best_sae().unwrap_or_default();
-        let passed = Passed { births, run: self.run, sae, flies: evolution.best_flies().to_vec() };
+        let told = json!({
+            "births": births,
+            "run": self.run,
+            "sae": evolution.best_sae().unwrap_or_default(),
+        });
+        self.send(births, told, evolution.best_flies().to_vec());
+    }
+
+    fn take_search(&mut self, search: &mut dyn Search) -> Result<()> {
+        let Standing { evals, births, objective, .. } = search.standing();
+        if self.last.replace(evals) == Some(evals) {
+            return Ok(());
+        }
+        let sae = cells::sae(search)?;
+        let told = json!({ "evals": evals, "births": births, "objective": objective, "sae": sae });
+        self.send(evals, told, search.read_back()?.flies);
+        Ok(())
+    }
+
+    fn send(&mut self, evals: u64, told: Value, flies: Vec<Fly>) {
+        let Value::Object(told) = told else { return };
+        let passed = Passed { evals, told, flies };
         // The writer ends at the first failure, which `outcome` tells; the evolution is worth more than its snapshots.
         self.queue = self.queue.take().filter(|queue| queue.send(passed).is_ok());
     }
 }
 
-/// Births from which the next snapshot is due after one at `births`: at every multiple of `every`, and closer together
-/// while a 32nd of the births is less than that.
-fn next_due(births: u64, every: u64) -> u64 {
-    let early = (births / EARLY_SHARE).clamp((every / EARLY_LEAST_SHARE).max(1), every);
-    let multiple = (births / every).saturating_add(1).saturating_mul(every);
-    multiple.min(births.saturating_add(early))
+/// Evals from which the next snapshot is due after one at `evals`: at every multiple of `every`, and closer together while a
+/// 32nd of the evals is less than that.
+fn next_due(evals: u64, every: u64) -> u64 {
+    let early = (evals / EARLY_SHARE).clamp((every / EARLY_LEAST_SHARE).max(1), every);
+    let multiple = (evals / every).saturating_add(1).saturating_mul(every);
+    multiple.min(evals.saturating_add(early))
 }
 
 /// Removes the snapshots that were `made` if the disk is full, since the result of the evolution needs room on it, too;
@@ -157,9 +205,7 @@ fn make_room(folder: &Path, made: &[PathBuf], error: Error) -> Error {
 fn write(path: &Path, population: &mut Population, told: &Map<String, Value>, passed: Passed) -> Result<()> {
     let mut told = told.clone();
     told.insert("status".to_owned(), "snapshot".into());
-    told.insert("births".to_owned(), passed.births.into());
-    told.insert("run".to_owned(), passed.run.into());
-    told.insert("sae".to_owned(), passed.sae.into());
+    told.extend(passed.told);
     told.sort_keys();
     population.flies = passed.flies;
     output::write_atomically_soon(path, &archive::encode_snapshot(population, &told)?)
@@ -200,7 +246,7 @@ mod tests {
         let stage = Population {
             width_px: 9,
             height_px: 9,
-            background: [0; 3],
+            background: [0; 3].into(),
             grout: None,
             masks: MaskSet::default(),
             flies: Vec::new(),

@@ -24,7 +24,7 @@ use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
 use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::model::{Blend, Grout, Population, Rgb, Scene, Target};
+use crate::model::{Backdrop, Blend, Grout, Population, Rgb, Scene, Target};
 use crate::vk::Validation;
 
 const EXAMPLES: &str = "\
@@ -55,7 +55,8 @@ pub(super) struct RenderArgs {
     /// Longer side of the written picture, 1 to 65,535 px [default: as evolved]
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
     pub output_size: Option<u64>,
-    /// Colour behind the tiles: black, white or RRGGBB [default: as stored]
+    /// Colour behind the tiles: black, white or RRGGBB [default: as stored, which may be transparent; .jpg is then over
+    /// black]
     #[arg(long, value_name = "COLOR", value_parser = values::color, help_heading = "Picture")]
     pub background: Option<Rgb>,
     /// Samples along each side of a pixel, 1 to 16 [default: 1 as evolved, 4 and more at another size]
@@ -256,7 +257,7 @@ fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
 
 /// The population as the options want it to look; whatever they change is in its key.
 fn adapted(mut population: Population, options: &RenderOptions) -> Result<Population> {
-    population.background = options.background.unwrap_or(population.background);
+    population.background = options.background.map_or(population.background, Backdrop::Color);
     if let Some(look) = &options.look {
         let Dress { masks, layers_by_run } = look.dress()?;
         let worn = PaperScheme { masks: layers_by_run, ..PaperScheme::default() };
@@ -291,7 +292,7 @@ fn draw(drawn: &mut Drawn, options: &RenderOptions, selected: &Selected) -> Resu
     let Population { background, masks, .. } = &drawn.population;
     // Nothing evolves, so the smallest lane will do.
     let target = Arc::new(Target::new(1, 1, vec![[0; 3]])?);
-    let scene = Scene { target, masks: Arc::new(masks.clone()), background: *background, fly_count: 1 };
+    let scene = Scene { target, masks: Arc::new(masks.clone()), background: background.color(), fly_count: 1 };
     let Opened { mut evaluator, validation_log } = selected.open(vec![scene])?;
     drawn.draw(&mut *evaluator, &options.outputs, options.verbosity)?;
     drop(evaluator);
@@ -312,7 +313,11 @@ impl Provenances {
         decisive.insert("population_sha256".to_owned(), provenance::population_sha256(population).into());
         decisive.insert("width_px".to_owned(), population.width_px.into());
         decisive.insert("height_px".to_owned(), population.height_px.into());
-        decisive.insert("background".to_owned(), provenance::hexadecimal(&population.background).into());
+        let background = match population.background {
+            Backdrop::Color(color) => provenance::hexadecimal(&color),
+            Backdrop::Transparent => "transparent".to_owned(),
+        };
+        decisive.insert("background".to_owned(), background.into());
         if let Some(Grout { width, color }) = population.grout {
             decisive.insert("grout".to_owned(), json!({"width": width, "color": provenance::hexadecimal(&color)}));
         }

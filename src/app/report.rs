@@ -8,13 +8,17 @@ use std::time::Duration;
 use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
+use super::cli::SchemeName;
 use super::device::Selected;
 use super::interrupt::EXIT_INTERRUPTED;
 use super::job::Job;
-use super::options::{EvolveOptions, Verbosity};
+use super::options::{EvolveOptions, SchemeOptions, Verbosity};
+use super::provenance::Ending;
 use super::scheme;
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
+use crate::model::Fly;
+use crate::model::cells::Standing;
 
 /// What became of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -45,8 +49,8 @@ pub(super) struct Row {
     pub seed: u64,
     pub scheme: &'static str,
     pub sae: Option<u64>,
-    /// What was minimised: the SAE.
-    pub objective: Option<u64>,
+    /// What was minimised: the SAE, or of a search in cells that with weights and penalties.
+    pub objective: Option<i64>,
     /// Peak signal-to-noise ratio in dB; none for a perfect likeness, whose ratio is infinite.
     pub psnr: Option<f64>,
     /// Index of Clark and Evans of the tiles' positions: 1 is random, less is clustered.
@@ -79,7 +83,7 @@ pub(super) struct Row {
 
 impl Row {
     /// The row of a picture about which nothing is known yet.
-    pub(super) fn new(input: &Path, seed: u64) -> Self {
+    pub(super) fn new(input: &Path, seed: u64, scheme: SchemeName) -> Self {
         Self {
             id: input.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             status: Status::Failed,
@@ -87,7 +91,7 @@ impl Row {
             output: Vec::new(),
             key: None,
             seed,
-            scheme: "paper",
+            scheme: scheme.word(),
             sae: None,
             objective: None,
             psnr: None,
@@ -116,7 +120,7 @@ impl Row {
         let outcome = evolution.outcome();
         self.stop = evolution.stop_reason().map(crate::evolve::StopReason::word);
         self.sae = evolution.best_sae();
-        self.objective = self.sae;
+        self.objective = self.sae.and_then(|sae| i64::try_from(sae).ok());
         self.living = Some(evolution.best_flies().iter().filter(|fly| fly.alive).count());
         self.is_warming_up = evolution.is_warming_up();
         self.births = outcome.births;
@@ -124,6 +128,17 @@ impl Row {
         self.evals = outcome.births;
         self.fallback_kills = outcome.fallback_kills;
         self.restarts = outcome.restarts;
+    }
+
+    /// Takes in how a search ended.
+    pub(super) fn note_search(&mut self, ending: &Ending, standing: &Standing, flies: &[Fly]) {
+        self.stop = Some(ending.stop.word());
+        self.sae = Some(ending.sae);
+        self.objective = Some(standing.objective);
+        self.living = Some(flies.iter().filter(|fly| fly.alive).count());
+        self.births = standing.births;
+        self.births_in_last_run = standing.births;
+        self.evals = standing.evals;
     }
 
     /// Takes in why there is no result, or not all of it.
@@ -155,17 +170,34 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
     let mean_error = sae as f64 / (job.target.pixels().len() as f64 * 3.0);
     let psnr = row.psnr.map_or("infinite PSNR".to_owned(), |db| format!("PSNR {db:.2} dB"));
     let seconds = row.evolve_ms / 1e3;
-    let births_per_s = (row.births as f64 / seconds.max(1e-6)) as u64;
+    let psnr_line = format!("SAE {}, mean error {mean_error:.2} of 255 per channel, {psnr}", count(sae));
     say(&format!("{}, {} tiles", size_line(options, job), count(job.fly_count as u64)));
-    say(&format!("SAE {}, mean error {mean_error:.2} of 255 per channel, {psnr}", count(sae)));
-    say(&format!(
-        "{} births ({} by the fallback), {} restarts, {seconds:.2} s, {} births/s on {}",
-        count(row.births),
-        count(row.fallback_kills),
-        count(u64::from(row.restarts)),
-        count(births_per_s),
-        row.device.as_deref().unwrap_or_default()
-    ));
+    let per_s = |value: u64| count((value as f64 / seconds.max(1e-6)) as u64);
+    let device = row.device.as_deref().unwrap_or_default();
+    match job.scheme {
+        SchemeOptions::Paper(_) => {
+            say(&psnr_line);
+            say(&format!(
+                "{} births ({} by the fallback), {} restarts, {seconds:.2} s, {} births/s on {device}",
+                count(row.births),
+                count(row.fallback_kills),
+                count(u64::from(row.restarts)),
+                per_s(row.births),
+            ));
+        }
+        SchemeOptions::Cells(_) => {
+            let objective = row.objective.filter(|&objective| u64::try_from(objective) != Ok(sae));
+            let objective =
+                objective.map_or(String::new(), |objective| format!(", objective {}", count(objective.unsigned_abs())));
+            say(&format!("{psnr_line}{objective}"));
+            say(&format!(
+                "{} evals, {} births, {seconds:.2} s, {} evals/s on {device}",
+                count(row.evals),
+                count(row.births),
+                per_s(row.evals),
+            ));
+        }
+    }
     let warming_up = match row.living.filter(|_| row.is_warming_up) {
         Some(living) if Some(living) != row.tiles => {
             format!(" before the last split or change of masks, with {} tiles alive", count(living as u64))
@@ -193,18 +225,26 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
 
 /// What a dry run says.
 pub(super) fn print_plan(row: &Row, options: &EvolveOptions, job: &Job, memory_bytes: u64) {
-    let scheme = &options.scheme;
-    let runs = u64::from(scheme.restarts) + 1;
-    let begin = options.init.as_ref().map_or("random".to_owned(), |path| path.display().to_string());
+    let begin = options.init.as_ref().map(|path| path.display().to_string());
     say(&size_line(options, job));
-    say(&format!("tiles      {} from {begin}", HumanCount(job.fly_count as u64)));
-    say(&format!(
-        "births     {} in each of {runs} runs, {} at a time, scheme {}, seed {}",
-        HumanCount(scheme.births),
-        scheme.batch_births,
-        row.scheme,
-        row.seed
-    ));
+    let fly_count = HumanCount(job.fly_count as u64);
+    match &job.scheme {
+        SchemeOptions::Paper(scheme) => {
+            say(&format!("tiles      {fly_count} from {}", begin.as_deref().unwrap_or("random")));
+            say(&format!(
+                "births     {} in each of {} runs, {} at a time, scheme paper, seed {}",
+                HumanCount(scheme.births),
+                u64::from(scheme.restarts) + 1,
+                scheme.batch_births,
+                row.seed
+            ));
+        }
+        SchemeOptions::Cells(cells) => {
+            say(&format!("tiles      {fly_count} from {}", begin.as_deref().unwrap_or("none")));
+            let evals = HumanCount(cells.budget(job.fly_count).evals);
+            say(&format!("evals      {evals}, scheme cells, seed {}", row.seed));
+        }
+    }
     if let Some(look) = look_line(options, job) {
         say(&format!("looks      {look}"));
     }
@@ -224,8 +264,11 @@ fn look_line(options: &EvolveOptions, job: &Job) -> Option<String> {
         told.push(options.look.describe());
     }
     told.extend(job.color_count.map(|count| format!("{count} colours")));
-    told.extend(job.scheme.color.palette.as_ref().map(|palette| format!("palette of {}", palette.colors().len())));
-    told.extend(scheme::told(&job.scheme));
+    told.extend(job.palette.as_ref().map(|palette| format!("palette of {}", palette.colors().len())));
+    told.extend(match &job.scheme {
+        SchemeOptions::Paper(scheme) => scheme::told(scheme),
+        SchemeOptions::Cells(cells) => cells.told(),
+    });
     (!told.is_empty()).then(|| told.join("; "))
 }
 

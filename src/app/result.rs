@@ -1,52 +1,58 @@
 //! The result of an evolution: checked against what was reported, and drawn for its outputs.
 
+use super::curve_file::Tabled;
 use super::job::Job;
 use super::options::EvolveOptions;
 use super::outputs::{Drawn, EncodedFile, View};
 use super::provenance::{self, Ending, Provenance};
 use crate::error::{Error, Result};
 use crate::metrics::Difference;
-use crate::model::{Canvas, Evaluator, Population, Rgb};
+use crate::model::{Canvas, Evaluator, Population, Rgb, Target};
 use crate::photo::{self, Photo};
 
 /// What an evolution led to.
-#[derive(Debug)]
 pub(super) struct Evolved {
     pub ending: Ending,
-    /// Peak signal-to-noise ratio of the best population in dB; none if it is infinite.
-    pub psnr_db: Option<f64>,
     /// The best population.
     pub drawn: Drawn,
+    /// How it came there, if that was asked for.
+    pub curve: Option<Box<dyn Tabled>>,
 }
 
-/// Draws the best population, which the evaluator holds in lane 0, at evaluation size and at the size asked for.
+/// Draws a population, with the marginal fitness of its flies, at evaluation size and at the size asked for; also returns its
+/// peak signal-to-noise ratio in dB, if that is not infinite.
 ///
 /// # Errors
 /// If the device fails, or if the mosaic is not what was scored.
 pub(super) fn draw(
     evaluator: &mut dyn Evaluator,
     options: &EvolveOptions,
-    population: Population,
-    ending: Ending,
-) -> Result<Evolved> {
-    let evaluation = evaluator.evaluation(0);
-    let (scored, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
+    (population, marginal): (Population, Vec<i64>),
+    scored: u64,
+) -> Result<(Drawn, Option<f64>)> {
     let (width_px, height_px) = (population.width_px, population.height_px);
     let mosaic = evaluator.draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
-    let difference = Difference::between(&mosaic.pixels, evaluator.scene(0).target.pixels());
+    let difference = difference(&mosaic.pixels, &evaluator.scene(0).target);
     let drawn = difference.sae();
-    if scored != ending.sae || drawn != ending.sae {
-        return Err(Error::Internal(format!(
-            "the best population had an SAE of {}, is evaluated to {scored} and drawn with {drawn}",
-            ending.sae
-        )));
+    if drawn != scored {
+        return Err(Error::Internal(format!("the best population had an SAE of {scored} and is drawn with {drawn}")));
     }
     let psnr_db = difference.psnr_db();
     let view = View::new(width_px, height_px, options.output_long_side_px);
     let picture = view.is_as_evolved().then_some(mosaic);
     let mut drawn = Drawn { population, marginal, view, picture, layers: None };
     drawn.draw(evaluator, &options.outputs, options.verbosity)?;
-    Ok(Evolved { ending, psnr_db, drawn })
+    Ok((drawn, psnr_db))
+}
+
+/// How far a mosaic is from its target where tiles are wanted.
+fn difference(pixels: &[Rgb], target: &Target) -> Difference {
+    let Some(transparent) = target.transparent() else { return Difference::between(pixels, target.pixels()) };
+    let wanted = |pixels: &[Rgb]| -> Vec<Rgb> {
+        let wanted = pixels.iter().zip(transparent).filter(|&(_, &is_transparent)| !is_transparent);
+        wanted.map(|(&color, _)| color).collect()
+    };
+    Difference::between(&wanted(pixels), &wanted(target.pixels()))
 }
 
 /// Longer side of the written picture in px, if it differs from the size at which the mosaic was evolved.

@@ -6,28 +6,28 @@ use std::time::Instant;
 
 use super::cli::EvolveArgs;
 use super::curve::Curve;
-use super::curve_file::CurveFile;
+use super::curve_file::{CurveFile, Tabled};
 use super::destination::Destination;
 use super::device::{Opened, Selected};
 use super::interrupt::Interrupt;
 use super::job::Job;
-use super::options::{EvolveOptions, Mode, Verbosity};
+use super::options::{EvolveOptions, Mode, SchemeOptions, Verbosity, scheme_name};
 use super::progress::Progress;
 use super::provenance::{Ending, Provenances};
 use super::recorder::Recorder;
 use super::report::{self, Row, Status};
 use super::result::Evolved;
 use super::watch::{Watch, Watchers};
-use super::{curve_file, destination, memory, outputs, provenance, result, scheme};
+use super::{cells, curve_file, destination, memory, outputs, provenance, result, scheme};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
-use crate::evolve::{Evolution, Spread};
+use crate::evolve::{Evolution, PaperScheme, Spread};
 use crate::model::Canvas;
 use crate::vk::ValidationLog;
 
 /// Evolves one picture and reports about it; the exit code of the process.
 pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
-    let mut row = Row::new(&args.input, args.seed);
+    let mut row = Row::new(&args.input, args.seed, scheme_name(args));
     let done = EvolveOptions::new(args).and_then(|options| evolve_picture(&options, &mut row));
     if let Err(error) = &done {
         row.note_failure(error);
@@ -78,21 +78,23 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
         return Ok(());
     }
 
-    let mut curve = (!options.curves.is_empty()).then(|| Curve::new(0));
     let recorder = begin_record(options, &job, &provenances)?;
     let mut watchers = Watchers { interrupt: &interrupt, recorder };
-    let evolved = evolve_job(options, &job, &selected, (&mut watchers, &mut curve), row)?;
+    let Evolved { ending, drawn, curve } = match &job.scheme {
+        SchemeOptions::Paper(scheme) => evolve_job(options, &job, (scheme, &selected), &mut watchers, row),
+        SchemeOptions::Cells(cells) => cells::search_job(options, &job, (cells, &selected), &mut watchers, row),
+    }?;
     let recorder = watchers.recorder;
     let began = Instant::now();
-    let status = evolved.ending.status;
-    let outputs = outputs_to_write(options, &provenances, &evolved.ending);
-    let mut files = outputs::encode(&outputs, evolved.drawn, &provenances.told(&evolved.ending))?;
+    let status = ending.status;
+    let outputs = outputs_to_write(options, &provenances, &ending);
+    let mut files = outputs::encode(&outputs, drawn, &provenances.told(&ending))?;
     files.extend(result::encode_target(options, &job, &provenances.target)?);
     let written = outputs::write(&files, &mut interrupt, &mut row.output);
     let curve_written = curve.map_or(Ok(()), |curve| {
         let told = (provenances.population.key(), status);
         let files = curves_to_write(options, told);
-        curve_file::write(&files, (&curve, row.id.as_str()), told, &mut interrupt, &mut row.output)
+        curve_file::write(&files, (&*curve, row.id.as_str()), told, &mut interrupt, &mut row.output)
     });
     written.and(curve_written)?;
     // A broken record of the course is no reason to lose its result.
@@ -108,14 +110,19 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
 /// Begins to keep snapshots, if they were asked for.
 fn begin_record(options: &EvolveOptions, job: &Job, provenances: &Provenances) -> Result<Option<Recorder>> {
     let Some(save_run) = &options.save_run else { return Ok(None) };
-    let births_planned = options.scheme.births.saturating_mul(u64::from(options.scheme.restarts) + 1);
+    let evals_planned = match &job.scheme {
+        SchemeOptions::Paper(scheme) => scheme.births.saturating_mul(u64::from(scheme.restarts) + 1),
+        SchemeOptions::Cells(cells) => cells.budget(job.fly_count).evals,
+    };
     let told = provenance::without_header(provenances.population.describe(None));
-    Recorder::begin(save_run, births_planned, job.population(Vec::new()), told).map(Some)
+    Recorder::begin(save_run, evals_planned, job.population(Vec::new()), told).map(Some)
 }
 
 /// Checks what depends on the picture's size; returns about how many bytes the work needs.
 fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
-    scheme::check_fly_count(options, job)?;
+    if let SchemeOptions::Paper(scheme) = &job.scheme {
+        scheme::check_fly_count(scheme, job.fly_count)?;
+    }
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let pixel_count = u64::from(width_px) * u64::from(height_px);
     let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
@@ -182,22 +189,23 @@ fn say_notes(job: &Job, options: &EvolveOptions, selected: &Selected) {
     report::say_device(selected);
 }
 
-/// Evolves the job, records its curve if one is asked for, and draws its best population; the device is closed before it
-/// returns.
+/// Evolves the job by the paper's scheme, records its curve if one is asked for, and draws its best population; the device
+/// is closed before it returns.
 fn evolve_job(
     options: &EvolveOptions,
     job: &Job,
-    selected: &Selected,
-    (watchers, curve): (&mut Watchers<'_>, &mut Option<Curve>),
+    (scheme, selected): (&PaperScheme, &Selected),
+    watchers: &mut Watchers<'_>,
     row: &mut Row,
 ) -> Result<Evolved> {
+    let mut curve = (!options.curves.is_empty()).then(|| Curve::new(0));
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
-    let evolution = Evolution::new(job.scheme.clone(), 0, width_px, height_px, job.first_flies());
+    let evolution = Evolution::new(scheme.clone(), 0, width_px, height_px, job.first_flies(scheme));
     let mut engine = Engine::new(evaluator, vec![evolution]);
     let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress));
-    let ran = engine.run(&mut (&mut watch, &mut *curve));
-    if let Some(curve) = curve {
+    let ran = engine.run(&mut (&mut watch, &mut curve));
+    if let Some(curve) = &mut curve {
         curve.finish(engine.evolutions());
     }
     row.evolve_ms = report::milliseconds(watch.finish(&engine.evolutions()[0]));
@@ -207,11 +215,17 @@ fn evolve_job(
     row.spread = Spread::of(evolution.best_flies(), width_px, height_px).clark_evans;
     let ending = Ending::of(evolution);
     let population = job.population(evolution.best_flies().to_vec());
-    let evolved = result::draw(engine.evaluator(), options, population, ending)?;
-    row.psnr = evolved.psnr_db;
+    let evaluation = engine.evaluator().evaluation(0);
+    let (scored, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
+    if scored != ending.sae {
+        let sentence = format!("the best population had an SAE of {} and is evaluated to {scored}", ending.sae);
+        return Err(Error::Internal(sentence));
+    }
+    let (drawn, psnr) = result::draw(engine.evaluator(), options, (population, marginal), ending.sae)?;
+    row.psnr = psnr;
     drop(engine);
     validation_log.map_or(Ok(()), |log| check_messages(&log))?;
-    Ok(evolved)
+    Ok(Evolved { ending, drawn, curve: curve.map(|curve| Box::new(curve) as Box<dyn Tabled>) })
 }
 
 /// Turns what the validation layer said into an error.

@@ -1,7 +1,8 @@
-//! The folder of a run: one population for each snapshot, named by the births before it.
+//! The folder of a run: one population for each snapshot, named by the evals before it, which are births in the paper's
+//! scheme.
 //!
 //! Names and metadata tell all, so there is no index that could disagree with the files. All snapshots of one key lie on
-//! one course of births; a folder may therefore hold those of a run that was cut beside those of its repetition.
+//! one course; a folder may therefore hold those of a run that was cut beside those of its repetition.
 
 use std::fs;
 use std::io;
@@ -15,9 +16,9 @@ use super::provenance::SOFTWARE;
 use crate::archive;
 use crate::error::{Error, Result};
 
-/// Least digits of the births in a name: names sort like their births up to a trillion.
+/// Least digits of the evals in a name: names sort like their evals up to a trillion.
 const NAME_DIGITS: usize = 12;
-/// The planned births are kept in so many equal steps, unless asked otherwise. With the closer snapshots of the
+/// The planned evals are kept in so many equal steps, unless asked otherwise. With the closer snapshots of the
 /// beginning, that makes about 240.
 const STEP_COUNT: u64 = 100;
 
@@ -26,7 +27,7 @@ const STEP_COUNT: u64 = 100;
 pub(super) struct SaveRun {
     /// The folder, as the user wrote it.
     pub folder: PathBuf,
-    /// Births between two snapshots.
+    /// Evals between two snapshots.
     every: Option<u64>,
 }
 
@@ -34,8 +35,8 @@ pub(super) struct SaveRun {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Snapshot {
     pub path: PathBuf,
-    /// Births before it, of all runs.
-    pub births: u64,
+    /// Evals before it, which are births of all runs in the paper's scheme.
+    pub evals: u64,
     /// Global fitness of the best population at that time.
     pub sae: u64,
     /// Key of the evolution that it belongs to.
@@ -43,7 +44,7 @@ pub(super) struct Snapshot {
 }
 
 impl SaveRun {
-    /// Snapshots in `folder`, `every` so many births.
+    /// Snapshots in `folder`, `every` so many evals.
     ///
     /// # Errors
     /// [`Error::Usage`] if `every` is 0.
@@ -67,9 +68,9 @@ impl SaveRun {
         Ok(())
     }
 
-    /// Births between two snapshots of an evolution of so many births.
-    pub(super) fn births_between(&self, births_planned: u64) -> u64 {
-        self.every.unwrap_or_else(|| births_planned.div_ceil(STEP_COUNT)).max(1)
+    /// Evals between two snapshots of an evolution of so many evals.
+    pub(super) fn evals_between(&self, evals_planned: u64) -> u64 {
+        self.every.unwrap_or_else(|| evals_planned.div_ceil(STEP_COUNT)).max(1)
     }
 
     /// Checks that the folder is empty, missing, or one of the evolution with this key.
@@ -106,9 +107,9 @@ impl SaveRun {
         prepare().map_err(|error| self.unusable(&error))
     }
 
-    /// The file of the snapshot after so many births.
-    pub(super) fn path_of(&self, births: u64) -> PathBuf {
-        self.folder.join(format!("{births:0NAME_DIGITS$}.npz"))
+    /// The file of the snapshot after so many evals.
+    pub(super) fn path_of(&self, evals: u64) -> PathBuf {
+        self.folder.join(format!("{evals:0NAME_DIGITS$}.npz"))
     }
 
     fn unusable(&self, error: &io::Error) -> Error {
@@ -116,7 +117,7 @@ impl SaveRun {
     }
 }
 
-/// The snapshots in `folder`, in the order of their births.
+/// The snapshots in `folder`, in the order of their evals.
 ///
 /// # Errors
 /// [`Error::Input`] if the folder cannot be read, holds none, one that does not tell its SAE, or those of more than one
@@ -127,7 +128,7 @@ pub(super) fn list(folder: &Path) -> Result<Vec<Snapshot>> {
     fs::read_dir(folder).map_err(unreadable)?;
     let found = contents(folder).map_err(unreadable)?.snapshots.into_iter();
     let mut snapshots = found.map(read).collect::<Result<Vec<_>>>()?;
-    snapshots.sort_by_key(|snapshot| snapshot.births);
+    snapshots.sort_by_key(|snapshot| snapshot.evals);
     let Some(first) = snapshots.first() else {
         let reason = "holds no snapshots; make some with smalti evolve --save-run";
         return Err(Error::input(folder, reason));
@@ -155,7 +156,7 @@ fn contents(folder: &Path) -> io::Result<Contents> {
     let mut contents = Contents::default();
     for entry in entries {
         let path = entry?.path();
-        if births_of(&path).is_some() {
+        if evals_of(&path).is_some() {
             contents.snapshots.push(path);
         } else {
             let name = path.file_name().unwrap_or_default().as_encoded_bytes();
@@ -165,8 +166,8 @@ fn contents(folder: &Path) -> io::Result<Contents> {
     Ok(contents)
 }
 
-/// The births in the name of a snapshot; none for any other name.
-fn births_of(path: &Path) -> Option<u64> {
+/// The evals in the name of a snapshot; none for any other name.
+fn evals_of(path: &Path) -> Option<u64> {
     let digits = path.file_name()?.to_str()?.strip_suffix(".npz")?;
     let is_name = digits.len() >= NAME_DIGITS && digits.bytes().all(|byte| byte.is_ascii_digit());
     digits.parse().ok().filter(|_| is_name)
@@ -181,9 +182,10 @@ fn read(path: PathBuf) -> Result<Snapshot> {
     let told = archive::read_meta(&path)?;
     let text = |key| told.get(key).and_then(Value::as_str);
     let number = |key| told.get(key).and_then(Value::as_u64);
-    let is_ours = text("software") == Some(SOFTWARE) && number("births") == births_of(&path);
-    match (text("key"), number("births"), number("sae")) {
-        (Some(key), Some(births), Some(sae)) if is_ours => Ok(Snapshot { births, sae, key: key.to_owned(), path }),
+    let evals = number("evals").or(number("births"));
+    let is_ours = text("software") == Some(SOFTWARE) && evals == evals_of(&path);
+    match (text("key"), evals, number("sae")) {
+        (Some(key), Some(evals), Some(sae)) if is_ours => Ok(Snapshot { evals, sae, key: key.to_owned(), path }),
         _ => Err(Error::input(&path, "is no snapshot of smalti evolve --save-run; remove it from the folder")),
     }
 }
@@ -193,20 +195,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_tell_the_births_and_sort_like_them() {
+    fn names_tell_the_evals_and_sort_like_them() {
         let save_run = SaveRun::new(Path::new("run"), None).expect("the default is fine");
-        let names: Vec<PathBuf> = [0, 7, 12_000, 999_999_999_999].map(|births| save_run.path_of(births)).into();
+        let names: Vec<PathBuf> = [0, 7, 12_000, 999_999_999_999].map(|evals| save_run.path_of(evals)).into();
         assert_eq!(names[2], Path::new("run/000000012000.npz"));
         assert!(names.is_sorted());
-        assert_eq!(births_of(&save_run.path_of(u64::MAX)), Some(u64::MAX));
+        assert_eq!(evals_of(&save_run.path_of(u64::MAX)), Some(u64::MAX));
         for name in ["run/12000.npz", "run/+00000012000.npz", "run/000000012000.png", "run/a00000012000.npz"] {
-            assert_eq!(births_of(Path::new(name)), None, "{name}");
+            assert_eq!(evals_of(Path::new(name)), None, "{name}");
         }
     }
 
     #[test]
-    fn the_default_covers_all_planned_births_in_a_hundred_steps() {
-        let every = |asked, planned| SaveRun::new(Path::new("run"), asked).map(|run| run.births_between(planned)).ok();
+    fn the_default_covers_all_planned_evals_in_a_hundred_steps() {
+        let every = |asked, planned| SaveRun::new(Path::new("run"), asked).map(|run| run.evals_between(planned)).ok();
         assert_eq!([every(None, 40_000), every(None, 40_001)], [Some(400), Some(401)]);
         assert_eq!([every(None, 0), every(Some(7), 40_000), every(Some(0), 40_000)], [Some(1), Some(7), None]);
     }

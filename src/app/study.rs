@@ -111,7 +111,7 @@ impl Recipe {
         Population {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
-            background: [0; 3],
+            background: [0; 3].into(),
             grout: None,
             masks: (*self.masks).clone(),
             flies,

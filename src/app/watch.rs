@@ -4,10 +4,12 @@
 use std::time::{Duration, Instant};
 
 use super::interrupt::Interrupt;
-use super::progress::{Progress, Standing};
+use super::progress::{Measure, Progress, Standing};
 use super::recorder::Recorder;
 use crate::engine::Observer;
-use crate::evolve::{Evolution, StopReason};
+use crate::error::Result;
+use crate::evolve::{Evolution, StopReason, cells};
+use crate::model::cells::Search;
 
 /// The clock is looked at more seldom while looks are closer together than this, and more often otherwise.
 const LOOK_INTERVAL: Duration = Duration::from_millis(2);
@@ -34,6 +36,8 @@ pub(super) struct Watch<'a> {
     /// Generations between two looks at the clock: they take microseconds on the CPU, and may take seconds elsewhere.
     stride: u32,
     until_look: u32,
+    /// Evals that a search is to make.
+    evals_planned: u64,
 }
 
 impl<'a> Watch<'a> {
@@ -48,7 +52,13 @@ impl<'a> Watch<'a> {
             last_look: Duration::ZERO,
             stride: 1,
             until_look: 0,
+            evals_planned: 0,
         }
+    }
+
+    /// For a search of so many evals.
+    pub(super) fn of_search(self, evals_planned: u64) -> Self {
+        Self { evals_planned, ..self }
     }
 
     /// Ends the progress and the record of `evolution`, the only one; returns the time since the beginning.
@@ -58,6 +68,17 @@ impl<'a> Watch<'a> {
         }
         self.progress.finish();
         self.began.elapsed()
+    }
+
+    /// As [`Watch::finish`], of a search.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(super) fn finish_search(self, search: &mut dyn Search) -> Result<Duration> {
+        self.progress.finish();
+        let took = self.began.elapsed();
+        self.recorder.map_or(Ok(()), |recorder| recorder.finish_search(search))?;
+        Ok(took)
     }
 
     /// Looks at the clock; a reason ends the evolution.
@@ -71,9 +92,11 @@ impl<'a> Watch<'a> {
         if self.progress.is_due(elapsed) {
             self.progress.show(&Standing {
                 elapsed,
-                births: evolutions.iter().map(|evolution| evolution.outcome().births).sum(),
-                births_planned: evolutions.iter().map(Evolution::births_planned).fold(0, u64::saturating_add),
-                sae: evolutions.iter().filter_map(Evolution::best_sae).sum(),
+                unit: "births",
+                count: evolutions.iter().map(|evolution| evolution.outcome().births).sum(),
+                planned: evolutions.iter().map(Evolution::births_planned).fold(0, u64::saturating_add),
+                measure: Measure::Sae,
+                error: evolutions.iter().filter_map(Evolution::best_sae).sum(),
                 time_limit: self.time_limit,
             });
         }
@@ -100,5 +123,39 @@ impl Observer for Watch<'_> {
             return None;
         }
         self.look(evolutions)
+    }
+}
+
+impl cells::Observer for Watch<'_> {
+    fn at_start(&mut self, search: &mut dyn Search) -> Result<()> {
+        self.after_round(search)
+    }
+
+    fn looks_at_rounds(&self) -> bool {
+        self.recorder.is_some()
+    }
+
+    fn after_round(&mut self, search: &mut dyn Search) -> Result<()> {
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.note_search(search))
+    }
+
+    fn after_epoch(&mut self, search: &mut dyn Search) -> Result<Option<StopReason>> {
+        if self.interrupt.is_requested() {
+            return Ok(Some(StopReason::Interrupted));
+        }
+        let elapsed = self.began.elapsed();
+        if self.progress.is_due(elapsed) {
+            let (standing, is_sae) = (search.standing(), cells::lowers_sae_alone(search.course()));
+            self.progress.show(&Standing {
+                elapsed,
+                unit: "evals",
+                count: standing.evals,
+                planned: self.evals_planned,
+                measure: if is_sae { Measure::Sae } else { Measure::Objective },
+                error: standing.objective.unsigned_abs(),
+                time_limit: self.time_limit,
+            });
+        }
+        Ok(self.time_limit.is_some_and(|limit| elapsed >= limit).then_some(StopReason::Time))
     }
 }

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::model::fly::Genes;
 use crate::model::mask::MASK_SIDE;
 use crate::model::population::FLY_COUNT_MAX;
-use crate::model::{Fly, Mask, Population};
+use crate::model::{Backdrop, Fly, Mask, Population};
 
 /// Deflate level of every member, 1 to 9.
 const LEVEL: i64 = 6;
@@ -31,7 +31,8 @@ enum Thrift {
 ///
 /// # Errors
 /// [`Error::Usage`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the file
-/// (`schema`, `width_px`, `height_px`, `background`, `blend`, `grout`), or if there are more than [`FLY_COUNT_MAX`] flies.
+/// (`schema`, `width_px`, `height_px`, `background`, `transparent`, `blend`, `grout`), or if there are more than
+/// [`FLY_COUNT_MAX`] flies.
 pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
     let fly_count = population.flies.len();
     if fly_count != fitness.len() || fly_count > FLY_COUNT_MAX {
@@ -88,7 +89,8 @@ fn write_members(
         schema: SCHEMA,
         width_px: population.width_px,
         height_px: population.height_px,
-        background: population.background,
+        background: population.background.color(),
+        transparent: population.background == Backdrop::Transparent,
         blend: population.masks.blend().into(),
         grout: population.grout.map(Into::into),
         meta: meta.clone(),

@@ -43,6 +43,9 @@ struct Header {
     width_px: u32,
     height_px: u32,
     background: [u8; 3],
+    /// Whether nothing lies behind the tiles; the colour is then that of programs without alpha.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    transparent: bool,
     /// How coverage is read; opaque masks are the rule and need no word.
     #[serde(default, skip_serializing_if = "BlendName::is_opaque")]
     blend: BlendName,
@@ -54,7 +57,7 @@ struct Header {
 }
 
 /// Keys of [`Header`], which the writer's own cannot have.
-const HEADER_KEYS: [&str; 6] = ["schema", "width_px", "height_px", "background", "blend", "grout"];
+const HEADER_KEYS: [&str; 7] = ["schema", "width_px", "height_px", "background", "transparent", "blend", "grout"];
 
 /// [`Grout`] as the file spells it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -16,7 +16,7 @@ use crate::model::grout::GROUT_WIDTH_MAX;
 use crate::model::mask::{MASK_LAYERS_MAX, MASK_SIDE, Texel};
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::model::{Fly, Mask, MaskSet, Population};
+use crate::model::{Backdrop, Fly, Mask, MaskSet, Population};
 use crate::photo;
 
 /// Most bytes of a column: eight per fly and an array header.
@@ -79,7 +79,8 @@ fn read_population(path: &Path) -> Result<Archive, String> {
             fly.clamped(header.width_px, header.height_px)
         })
         .collect();
-    let Header { width_px, height_px, background, grout, meta, .. } = header;
+    let Header { width_px, height_px, background, transparent, grout, meta, .. } = header;
+    let background = if transparent { Backdrop::Transparent } else { background.into() };
     let grout = grout.map(Into::into);
     Ok(Archive { population: Population { width_px, height_px, background, grout, masks, flies }, fitness, meta })
 }

@@ -15,7 +15,7 @@ use super::BlendName;
 use crate::error::{Error, Result};
 use crate::model::fly::Genes;
 use crate::model::target::hexadecimal;
-use crate::model::{Fly, Population};
+use crate::model::{Backdrop, Fly, Population};
 use crate::photo;
 
 /// First line of every CSV table.
@@ -132,7 +132,7 @@ pub fn encode_json(population: &Population, fitness: &[i64], meta: &Map<String, 
     let header = [
         ("width_px", json!(width_px)),
         ("height_px", json!(height_px)),
-        ("background", json!(hexadecimal(*background))),
+        ("background", json!(background_word(*background))),
         ("blend", json!(BlendName::from(masks.blend()))),
         ("masks", json!(masks.layers().len())),
     ];
@@ -146,6 +146,14 @@ pub fn encode_json(population: &Population, fitness: &[i64], meta: &Map<String, 
     }
     text.extend(b"\n]}\n");
     Ok(text)
+}
+
+/// A colour as `#rrggbb`, or `transparent`.
+fn background_word(background: Backdrop) -> String {
+    match background {
+        Backdrop::Color(color) => hexadecimal(color),
+        Backdrop::Transparent => "transparent".to_owned(),
+    }
 }
 
 /// The `meta` of the JSON table at `path`, without reading its rows; `None` if it is not one of ours.

@@ -8,7 +8,7 @@ use crate::model::blocks::{BlockLists, index_of};
 use crate::model::mask::{COVERAGE_THRESHOLD, Texel, shaded};
 use crate::model::tile::{Tile, pack, unpack};
 use crate::model::translucency::{Compositing, opacity};
-use crate::model::{Blend, Canvas, Mask, Mosaic, Patch, Population};
+use crate::model::{Backdrop, Blend, Canvas, Mask, Mosaic, Patch, Population};
 
 /// Samples along each side of a patch, before it is cut to whole pixels: 256 KiB of colours stay in a core's cache.
 const PATCH_SIDE: u32 = 256;
@@ -22,7 +22,7 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
     let tiles: Vec<Tile> = population.flies.iter().map(bake).collect();
     let mut lists = BlockLists::new(&samples, side);
     lists.fill(&population.flies, &tiles);
-    let mut mosaic = Mosaic::new(canvas);
+    let mut mosaic = Mosaic::new(canvas, population.background);
     // A row of patches at a time, so that memory does not grow with the number of samples.
     for first in (0..lists.block_count()).step_by(lists.columns() as usize) {
         let drawn: Vec<(Patch, Vec<u32>)> = (first..first + lists.columns() as usize)
@@ -40,18 +40,25 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
     mosaic
 }
 
-/// Packed colours of a patch, row by row.
+/// Opacity of a sample that a tile covers.
+const SOLID: u32 = 255 << 24;
+
+/// Packed colours of a patch, row by row, with their opacity in the highest byte if the backdrop is transparent.
 fn draw_patch(population: &Population, tiles: &[Tile], list: &[u64], patch: &Patch) -> Vec<u32> {
     let sample_count = (patch.width_px * patch.height_px) as usize;
     let tiles = list.iter().map(|&key| &tiles[index_of(key) as usize]);
     let tiles = tiles.map(|tile| (tile, &population.masks.layers()[tile.mask as usize]));
+    let background = match population.background {
+        Backdrop::Color(color) => Some(color),
+        Backdrop::Transparent => None,
+    };
     match population.masks.blend() {
         Blend::Opaque => {
-            let mut colors = vec![pack(population.background); sample_count];
+            let mut colors = vec![background.map_or(0, pack); sample_count];
             for (tile, mask) in tiles.rev() {
-                let own = |texel: Texel| shaded(tile.color, u32::from(texel.shade));
+                let own = |texel: Texel| shaded(tile.color, u32::from(texel.shade)) | SOLID;
                 // Two loops, so that drawing without grout does not ask for it at every sample.
-                match population.grout.map(|grout| pack(grout.color)) {
+                match population.grout.map(|grout| pack(grout.color) | SOLID) {
                     None => for_each_solid(tile, mask, patch, |sample, _, texel| colors[sample] = own(texel)),
                     Some(grout) => for_each_solid(tile, mask, patch, |sample, (u, v), texel| {
                         colors[sample] = if tile.is_inside_ring(u, v) { own(texel) } else { grout };
@@ -68,7 +75,9 @@ fn draw_patch(population: &Population, tiles: &[Tile], list: &[u64], patch: &Pat
                     samples[sample].add(opacity(u32::from(texel.coverage)), unpack(color));
                 });
             }
-            samples.into_iter().map(|sample| pack(sample.over(population.background))).collect()
+            let shown =
+                |sample: Compositing| background.map_or_else(|| sample.alone(), |color| pack(sample.over(color)));
+            samples.into_iter().map(shown).collect()
         }
     }
 }

@@ -20,9 +20,12 @@ use crate::model::{Change, Evaluation, Fly, Lane, Target};
 pub enum StopReason {
     /// All births of all runs were made.
     Births,
-    /// The last run saw no better population for as many births as its patience.
+    /// As many children were evaluated as a search in cells was given.
+    Evals,
+    /// The last run saw no better population for as many births as its patience; in cells, no much better one for as many
+    /// evals.
     Patience,
-    /// No fly with marginal fitness <= 0 was left.
+    /// No fly with marginal fitness <= 0 was left; in cells, no child was possible.
     Dry,
     /// The global fitness reached the target.
     TargetSae,
@@ -38,6 +41,7 @@ impl StopReason {
     pub fn word(self) -> &'static str {
         match self {
             Self::Births => "births",
+            Self::Evals => "evals",
             Self::Patience => "patience",
             Self::Dry => "dry",
             Self::TargetSae => "target-sae",

@@ -4,6 +4,7 @@
 //! file or a clock.
 
 mod breeder;
+pub mod cells;
 pub mod color;
 pub mod evolution;
 pub mod first;
@@ -13,6 +14,7 @@ pub mod scheme;
 pub mod selection;
 mod showing;
 pub mod spread;
+pub mod style;
 
 /// Version of the algorithm: raised whenever the same picture, options and seed lead to another result.
 pub const ALGORITHM_VERSION: u32 = 1;

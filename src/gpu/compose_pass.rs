@@ -9,7 +9,7 @@ use super::shaders;
 use crate::error::Result;
 use crate::model::blocks::{BlockLists, index_of};
 use crate::model::tile::pack;
-use crate::model::{Canvas, Mosaic, Patch, Population};
+use crate::model::{Backdrop, Canvas, Mosaic, Patch, Population};
 use crate::vk::{
     Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePipeline, ComputeShader, Device, Recorder, Residence,
 };
@@ -23,7 +23,7 @@ const ENTRIES_PER_SUBMISSION: usize = 1 << 18;
 pub(super) struct ComposePass {
     samples: Canvas,
     shape: KernelShape,
-    background: u32,
+    background: Backdrop,
     tiles: Vec<Tile>,
     lists: BlockLists,
     items: Vec<ComposeItem>,
@@ -62,13 +62,13 @@ impl ComposePass {
         let colors = storage("compose colours", block_count * shape.block_pixels() * 4)?;
         recorder.write_buffer(&tile_buffer, 0, bytemuck::cast_slice(&tiles))?;
         let masks = create_mask_buffer(device, recorder, std::iter::once(&population.masks))?;
-        let pipeline = create_pipeline(device, shape)?;
+        let pipeline = create_pipeline(device, shape, population.background)?;
         let bindings = [&item_buffer, &entry_buffer, &tile_buffer, &states, &colors, &masks].map(Binding::Buffer);
         let group = BindingGroup::create("compose", pipeline.layout(), &bindings)?;
         Ok(Self {
             samples,
             shape,
-            background: pack(population.background),
+            background: population.background,
             tiles,
             lists,
             items: Vec::new(),
@@ -84,7 +84,7 @@ impl ComposePass {
 
     /// Draws on the canvas, each pixel the mean of `supersampling`² samples.
     pub fn draw(mut self, recorder: &mut Recorder, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
-        let mut mosaic = Mosaic::new(canvas);
+        let mut mosaic = Mosaic::new(canvas, self.background);
         for number in 0..self.lists.block_count() {
             let patch = self.lists.patch(number, &self.samples);
             let colors = self.draw_patch(recorder, number, &patch)?;
@@ -93,7 +93,7 @@ impl ComposePass {
         Ok(mosaic)
     }
 
-    /// Packed colours of a patch, row by row.
+    /// Packed colours of a patch, row by row, with their opacity in the highest byte if the backdrop is transparent.
     fn draw_patch(&mut self, recorder: &mut Recorder, number: usize, patch: &Patch) -> Result<Vec<u32>> {
         let side = self.shape.block_side_px;
         let columns = patch.width_px.div_ceil(side);
@@ -182,7 +182,7 @@ impl ComposePass {
         recorder.write_buffer(&self.entry_buffer, 0, bytemuck::cast_slice(&self.entries))?;
         let mut pass = recorder.compute_pass("compose")?;
         pass.bind(&self.pipeline, &self.group);
-        let push = ComposePush { item_count: self.items.len() as u32, background: self.background };
+        let push = ComposePush { item_count: self.items.len() as u32, background: pack(self.background.color()) };
         pass.push_constants(bytemuck::bytes_of(&push));
         let columns = self.items.len().min(self.workgroups_per_row);
         pass.dispatch(columns as u32, self.items.len().div_ceil(columns) as u32, 1);
@@ -192,13 +192,15 @@ impl ComposePass {
     }
 }
 
-fn create_pipeline(device: &Arc<Device>, shape: KernelShape) -> Result<Arc<ComputePipeline>> {
+fn create_pipeline(device: &Arc<Device>, shape: KernelShape, background: Backdrop) -> Result<Arc<ComputePipeline>> {
+    let [threads, side, samples] = shape.specialization();
+    let transparent = (3, u32::from(background == Backdrop::Transparent));
     ComputePipeline::create(
         device,
         &ComputeShader {
             name: "compose",
             spirv: &shaders::words(shaders::COMPOSE),
-            specialization: &shape.specialization(),
+            specialization: &[threads, side, samples, transparent],
             bindings: &[BindingKind::StorageBuffer; 6],
             push_constant_bytes: size_of::<ComposePush>() as u32,
         },

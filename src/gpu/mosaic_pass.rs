@@ -11,7 +11,7 @@ use crate::error::Result;
 use crate::model::blocks::{BlockLists, depth_order, index_of};
 use crate::model::mask::MASK_SIDE;
 use crate::model::tile::pack;
-use crate::model::{Canvas, Fly, Grout, MaskSet, Mosaic, NO_FLY, Patch, Population};
+use crate::model::{Backdrop, Canvas, Fly, Grout, MaskSet, Mosaic, NO_FLY, Patch, Population};
 use crate::vk::{
     Binding, BindingGroup, BindingKind, Buffer, BufferUse, ClearColor, ColorTarget, DepthTest, Device,
     GraphicsPipeline, GraphicsShaders, Image, ImageFormat, ImageShape, Recorder, RenderTargets, Residence,
@@ -23,7 +23,7 @@ const PATCH_SIDE: u32 = 2048;
 /// Pipeline, attachments and tiles of one population on one canvas of samples.
 pub(super) struct MosaicPass {
     samples: Canvas,
-    background: [u8; 3],
+    background: Backdrop,
     grout: Option<Grout>,
     tiles: Vec<Tile>,
     ranks: Vec<u32>,
@@ -78,7 +78,7 @@ impl MosaicPass {
 
     /// Draws on `canvas`, each pixel the mean of `supersampling`² samples.
     pub fn draw(&self, recorder: &mut Recorder, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
-        let mut mosaic = Mosaic::new(canvas);
+        let mut mosaic = Mosaic::new(canvas, self.background);
         let color = Arc::clone(&self.color);
         self.draw_patches(recorder, supersampling, &color, |patch, samples| {
             mosaic.absorb(patch, samples, supersampling);
@@ -130,10 +130,11 @@ impl MosaicPass {
     fn record(&self, recorder: &mut Recorder, patch: &Patch, list: &[u64]) -> Result<()> {
         let instances: Vec<Instance> = list.iter().map(|&key| self.instance(index_of(key))).collect();
         recorder.write_buffer(&self.instances, 0, bytemuck::cast_slice(&instances))?;
-        let [r, g, b] = self.background.map(|channel| f32::from(channel) / 255.0);
+        let [r, g, b] = self.background.color().map(|channel| f32::from(channel) / 255.0);
+        let alpha = if self.background == Backdrop::Transparent { 0.0 } else { 1.0 };
         let targets = RenderTargets {
             colors: &[
-                ColorTarget { image: &self.color, clear: ClearColor::Float([r, g, b, 1.0]) },
+                ColorTarget { image: &self.color, clear: ClearColor::Float([r, g, b, alpha]) },
                 ColorTarget { image: &self.fly, clear: ClearColor::Uint([NO_FLY; 4]) },
             ],
             depth: Some(&self.depth),

@@ -28,6 +28,6 @@ pub use guide::{Guide, GuideSample};
 pub use lane::{Lane, Scene};
 pub use mask::{Blend, Mask, MaskSet};
 pub use mosaic::{Mosaic, Patch};
-pub use population::Population;
+pub use population::{Backdrop, Population};
 pub use target::{Rgb, Target};
 pub use tile::{Canvas, Tile};

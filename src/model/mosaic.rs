@@ -1,17 +1,20 @@
 //! The rendered picture, put together patch by patch from samples.
 
+use super::population::Backdrop;
 use super::target::Rgb;
 use super::tile::{Canvas, unpack};
 
-/// A rendered population: 8-bit sRGB pixels, row by row from the top.
+/// A rendered population: 8-bit sRGB pixels, row by row from the top, with alpha if its backdrop is transparent.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mosaic {
     /// Width in px.
     pub width_px: u32,
     /// Height in px.
     pub height_px: u32,
-    /// `width_px * height_px` colours.
+    /// `width_px * height_px` colours; with alpha they are not premultiplied, and black where nothing is.
     pub pixels: Vec<Rgb>,
+    /// `width_px * height_px` opacities, 0 where nothing is to 255; none if the whole picture is opaque.
+    pub alpha: Option<Vec<u8>>,
 }
 
 /// A rectangle of samples of a canvas.
@@ -28,34 +31,66 @@ pub struct Patch {
 }
 
 impl Mosaic {
-    /// A black mosaic of the size of `canvas`.
+    /// A black mosaic of the size of `canvas`; of alpha 0 if `backdrop` is transparent.
     #[must_use]
-    pub fn new(canvas: &Canvas) -> Self {
-        let pixels = vec![[0; 3]; canvas.width_px as usize * canvas.height_px as usize];
-        Self { width_px: canvas.width_px, height_px: canvas.height_px, pixels }
+    pub fn new(canvas: &Canvas, backdrop: Backdrop) -> Self {
+        let pixel_count = canvas.width_px as usize * canvas.height_px as usize;
+        let alpha = (backdrop == Backdrop::Transparent).then(|| vec![0; pixel_count]);
+        Self { width_px: canvas.width_px, height_px: canvas.height_px, pixels: vec![[0; 3]; pixel_count], alpha }
     }
 
     /// Writes the pixels of a patch of samples: each pixel is the mean of `supersampling`² samples, rounded half up.
     ///
-    /// `samples` are packed colours, row by row. The mean is of stored 8-bit values, as everywhere in the engine. The
-    /// patch must start at a multiple of `supersampling` and hold whole pixels.
+    /// `samples` are packed colours, row by row, and with alpha their opacity in the highest byte: a pixel's alpha is the
+    /// mean of theirs, and its colour the mean weighted by it. The mean is of stored 8-bit values, as everywhere in the
+    /// engine. The patch must start at a multiple of `supersampling` and hold whole pixels.
     pub fn absorb(&mut self, patch: &Patch, samples: &[u32], supersampling: u32) {
-        let count = supersampling * supersampling;
         let (x, y) = (patch.x / supersampling, patch.y / supersampling);
+        let width = (patch.width_px / supersampling) as usize;
         for row in 0..patch.height_px / supersampling {
             let first = (y + row) as usize * self.width_px as usize + x as usize;
-            let pixels = &mut self.pixels[first..][..(patch.width_px / supersampling) as usize];
-            for (column, pixel) in (0..).zip(pixels) {
-                let mut sums = [0; 3];
-                for sample_row in row * supersampling..(row + 1) * supersampling {
-                    let start = (sample_row * patch.width_px + column * supersampling) as usize;
-                    for &sample in &samples[start..][..supersampling as usize] {
-                        let color = unpack(sample);
-                        sums.iter_mut().zip(color).for_each(|(sum, channel)| *sum += u32::from(channel));
-                    }
-                }
-                *pixel = sums.map(|sum| ((sum + count / 2) / count) as u8);
+            let rows = &samples[(row * supersampling * patch.width_px) as usize..];
+            let samples_of = |column: u32| {
+                let starts =
+                    (0..supersampling).map(move |row| (row * patch.width_px + column * supersampling) as usize);
+                starts.map(move |start| &rows[start..][..supersampling as usize])
+            };
+            let pixels = (0..).zip(&mut self.pixels[first..][..width]);
+            match &mut self.alpha {
+                None => pixels.for_each(|(column, pixel)| *pixel = mean(samples_of(column), supersampling)),
+                Some(alpha) => pixels.zip(&mut alpha[first..][..width]).for_each(|((column, pixel), alpha)| {
+                    (*pixel, *alpha) = mean_with_alpha(samples_of(column), supersampling);
+                }),
             }
         }
+    }
+}
+
+/// The mean colour of `supersampling`² samples.
+fn mean<'a>(rows: impl Iterator<Item = &'a [u32]>, supersampling: u32) -> Rgb {
+    let count = supersampling * supersampling;
+    let mut sums = [0; 3];
+    for row in rows {
+        for &sample in row {
+            sums.iter_mut().zip(unpack(sample)).for_each(|(sum, channel)| *sum += u32::from(channel));
+        }
+    }
+    sums.map(|sum| ((sum + count / 2) / count) as u8)
+}
+
+/// The mean opacity of `supersampling`² samples, and the mean of their colours weighted by it; black if it is 0.
+fn mean_with_alpha<'a>(rows: impl Iterator<Item = &'a [u32]>, supersampling: u32) -> (Rgb, u8) {
+    let count = supersampling * supersampling;
+    let (mut sums, mut weight) = ([0; 3], 0);
+    for row in rows {
+        for &sample in row {
+            let alpha = sample >> 24;
+            sums.iter_mut().zip(unpack(sample)).for_each(|(sum, channel)| *sum += alpha * u32::from(channel));
+            weight += alpha;
+        }
+    }
+    match (weight + count / 2) / count {
+        0 => ([0; 3], 0),
+        alpha => (sums.map(|sum| ((sum + weight / 2) / weight) as u8), alpha as u8),
     }
 }

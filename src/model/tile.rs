@@ -244,7 +244,8 @@ pub fn inverse(divisor: u32) -> u32 {
 /// Of the quotient, below 2^8, the shift loses less than 2^-7, and so does the inverse with its 15 bits at least: the
 /// estimate is the quotient or one less. All products fit 32 bits.
 #[inline(always)]
-fn quotient(value: u32, divisor: u32, inverse: u32) -> u32 {
+#[must_use]
+pub fn quotient(value: u32, divisor: u32, inverse: u32) -> u32 {
     let estimate = (value >> (inverse >> 24)).wrapping_mul(inverse & 0xFF_FFFF) >> 23;
     // 0 if the estimate is one less, else -1: without a comparison, which would not stay in a vector.
     let is_enough = value.wrapping_sub(estimate.wrapping_mul(divisor)).wrapping_sub(divisor) as i32 >> 31;

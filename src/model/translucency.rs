@@ -9,6 +9,7 @@
 //! marginal fitness can be exact at any depth: see [`widest_after`].
 
 use super::target::Rgb;
+use super::tile::pack;
 
 /// Transmittance of a pixel before its nearest layer; a weight of 1.
 pub const CLEAR: u32 = 1 << 16;
@@ -91,6 +92,17 @@ impl Compositing {
     pub fn over(mut self, background: Rgb) -> Rgb {
         self.weigh(self.transmittance, background);
         self.sums.map(|sum| channel(sum) as u8)
+    }
+
+    /// The colour of the layers alone, not premultiplied, packed with their opacity in the highest byte; 0 if that is 0.
+    #[inline]
+    #[must_use]
+    pub fn alone(self) -> u32 {
+        let weight = CLEAR - self.transmittance;
+        match channel(weight * 255) {
+            0 => 0,
+            alpha => pack(self.sums.map(|sum| ((sum + weight / 2) / weight) as u8)) | alpha << 24,
+        }
     }
 
     #[inline]

@@ -14,14 +14,14 @@ const PNG_LEVEL: u8 = 6;
 /// A file format that pictures are written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Lossless; 8-bit RGB, marked as sRGB.
+    /// Lossless; 8-bit RGB, or RGBA with [`encode_with_alpha`], marked as sRGB.
     Png,
     /// Lossy; without colour subsampling (4:4:4).
     Jpeg {
         /// From 1 (smallest) to 100 (best).
         quality: u8,
     },
-    /// Lossless; 8-bit RGB.
+    /// Lossless; 8-bit RGB, or RGBA with [`encode_with_alpha`].
     WebP,
 }
 
@@ -37,22 +37,54 @@ pub fn encode(format: Format, photo: &Photo, metadata: &Metadata) -> Result<Vec<
     }
 }
 
+/// The photo with an opacity per pixel, 0 to 255, as a file of this format; not premultiplied. A format without alpha
+/// shows it over black. Without `alpha` it is [`encode`].
+///
+/// # Errors
+/// As [`encode`], and [`Error::Internal`] if there is not one opacity per pixel.
+pub fn encode_with_alpha(format: Format, photo: &Photo, alpha: Option<&[u8]>, metadata: &Metadata) -> Result<Vec<u8>> {
+    let Some(alpha) = alpha else { return encode(format, photo, metadata) };
+    if alpha.len() != photo.pixels.len() {
+        return Err(Error::Internal(format!("{} opacities for {} pixels", alpha.len(), photo.pixels.len())));
+    }
+    let pixels = || photo.pixels.iter().zip(alpha).map(|(&[r, g, b], &a)| [r, g, b, a]);
+    match format {
+        Format::Png => {
+            metadata::check(metadata)?;
+            let size_px = (photo.width_px, photo.height_px);
+            let pixels: Vec<[u8; 4]> = pixels().collect();
+            png_bytes(size_px, png::ColorType::Rgba, pixels.as_flattened(), metadata).map_err(|error| not_png(&error))
+        }
+        Format::WebP => {
+            let pixels: Vec<[u8; 4]> = pixels().collect();
+            webp_bytes((photo.width_px, photo.height_px), ExtendedColorType::Rgba8, pixels.as_flattened(), metadata)
+        }
+        Format::Jpeg { .. } => {
+            let over_black =
+                |[r, g, b, a]: [u8; 4]| [r, g, b].map(|c| ((u32::from(c) * u32::from(a) + 127) / 255) as u8);
+            encode(format, &Photo { pixels: pixels().map(over_black).collect(), ..*photo }, metadata)
+        }
+    }
+}
+
 /// The photo as an 8-bit RGB PNG with an sRGB chunk and the metadata as text chunks.
 ///
 /// # Errors
 /// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]) or the photo has no pixels.
 pub fn encode_png(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
     metadata::check(metadata)?;
-    let (samples, size_px) = (photo.pixels.as_flattened(), (photo.width_px, photo.height_px));
-    png_bytes(samples, size_px, png::ColorType::Rgb, metadata)
-        .map_err(|error| Error::Usage(format!("the picture cannot be written as PNG: {error}")))
+    let size_px = (photo.width_px, photo.height_px);
+    png_bytes(size_px, png::ColorType::Rgb, photo.pixels.as_flattened(), metadata).map_err(|error| not_png(&error))
 }
 
-/// The PNG of these samples, `color` of them a pixel.
+fn not_png(error: &png::EncodingError) -> Error {
+    Error::Usage(format!("the picture cannot be written as PNG: {error}"))
+}
+
 fn png_bytes(
-    samples: &[u8],
     size_px: (u32, u32),
     color: png::ColorType,
+    samples: &[u8],
     metadata: &Metadata,
 ) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
@@ -84,8 +116,8 @@ pub fn encode_png_with_alpha(
     metadata: &Metadata,
 ) -> Result<Vec<u8>> {
     metadata::check(metadata)?;
-    png_bytes(pixels.as_flattened(), (width_px, height_px), png::ColorType::Rgba, metadata)
-        .map_err(|error| Error::Usage(format!("the picture cannot be written as PNG with alpha: {error}")))
+    png_bytes((width_px, height_px), png::ColorType::Rgba, pixels.as_flattened(), metadata)
+        .map_err(|error| not_png(&error))
 }
 
 /// An encoder with the settings of every PNG that is written.
@@ -133,9 +165,17 @@ pub fn encode_jpeg(photo: &Photo, quality: u8, metadata: &Metadata) -> Result<Ve
 /// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]), or a side of the photo is 0 or above
 /// [`webp::WEBP_SIDE_MAX_PX`].
 pub fn encode_webp(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
+    webp_bytes((photo.width_px, photo.height_px), ExtendedColorType::Rgb8, photo.pixels.as_flattened(), metadata)
+}
+
+fn webp_bytes(
+    (width_px, height_px): (u32, u32),
+    color: ExtendedColorType,
+    samples: &[u8],
+    metadata: &Metadata,
+) -> Result<Vec<u8>> {
     metadata::check(metadata)?;
-    let Photo { width_px, height_px, pixels } = photo;
-    if pixels.is_empty() || *width_px.max(height_px) > webp::WEBP_SIDE_MAX_PX {
+    if samples.is_empty() || width_px.max(height_px) > webp::WEBP_SIDE_MAX_PX {
         return Err(Error::Usage(format!(
             "the picture cannot be written as WebP: its sides must be 1 to {} px, not {width_px}x{height_px}",
             webp::WEBP_SIDE_MAX_PX
@@ -143,7 +183,11 @@ pub fn encode_webp(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
     }
     let mut bytes = Vec::new();
     WebPEncoder::new_lossless(&mut bytes)
-        .encode(pixels.as_flattened(), *width_px, *height_px, ExtendedColorType::Rgb8)
+        .encode(samples, width_px, height_px, color)
         .map_err(|error| Error::Usage(format!("the picture cannot be written as WebP: {error}")))?;
-    if metadata.is_empty() { Ok(bytes) } else { Ok(webp::with_metadata(&bytes, (*width_px, *height_px), metadata)) }
+    if metadata.is_empty() {
+        return Ok(bytes);
+    }
+    let alpha = if color == ExtendedColorType::Rgba8 { webp::HAS_ALPHA } else { 0 };
+    Ok(webp::with_metadata(&bytes, (width_px, height_px), alpha, metadata))
 }

@@ -13,6 +13,8 @@ pub const WEBP_SIDE_MAX_PX: u32 = 16_383;
 const HEADER_BYTES: usize = 12;
 /// Flag of the extended header: the file has an XMP packet.
 const HAS_XMP: u8 = 0x04;
+/// Flag of the extended header: some pixels are not opaque.
+pub(super) const HAS_ALPHA: u8 = 0x10;
 /// Most bytes of an XMP packet that is read.
 const XMP_BYTES_MAX: u64 = 16 << 20;
 
@@ -21,9 +23,15 @@ pub(super) fn is_webp(header: &[u8]) -> bool {
     header.starts_with(b"RIFF") && header.get(8..HEADER_BYTES) == Some(b"WEBP")
 }
 
-/// The simple WebP file `bytes`, of one lossless picture of `width_px` x `height_px`, as an extended one with metadata.
-pub(super) fn with_metadata(bytes: &[u8], (width_px, height_px): (u32, u32), metadata: &Metadata) -> Vec<u8> {
-    let mut extended = vec![HAS_XMP, 0, 0, 0];
+/// The simple WebP file `bytes`, of one lossless picture of `width_px` x `height_px`, as an extended one with metadata;
+/// `alpha` is 0 or [`HAS_ALPHA`].
+pub(super) fn with_metadata(
+    bytes: &[u8],
+    (width_px, height_px): (u32, u32),
+    alpha: u8,
+    metadata: &Metadata,
+) -> Vec<u8> {
+    let mut extended = vec![HAS_XMP | alpha, 0, 0, 0];
     extended.extend(&(width_px - 1).to_le_bytes()[..3]);
     extended.extend(&(height_px - 1).to_le_bytes()[..3]);
     let mut body = b"WEBP".to_vec();
@@ -98,7 +106,7 @@ mod tests {
     #[test]
     fn no_cut_or_changed_byte_leads_out_of_the_file() {
         let entries = vec![("smalti".to_owned(), "{\"a\":1}".to_owned())];
-        let whole = with_metadata(b"RIFF\x10\0\0\0WEBPVP8L\x03\0\0\0abc\0", (1, 1), &entries);
+        let whole = with_metadata(b"RIFF\x10\0\0\0WEBPVP8L\x03\0\0\0abc\0", (1, 1), 0, &entries);
         assert_eq!(metadata(Cursor::new(&whole)).expect("memory can be read"), entries);
         for cut in 0..whole.len() {
             for value in 0..=255 {

@@ -1,9 +1,10 @@
 //! Populations as SVG: one element per living fly, the farthest first, so that the document's order is the depth order.
 //!
 //! Geometry comes from the integer genes alone. A user unit is 1/128 px, half of a gene's unit, so that the corners of
-//! tiles before they are turned are whole numbers; the view box begins at -64, since the centre of pixel (0, 0) is the origin. Masks
-//! stand once in `<defs>` (`shapes.rs`). A tile with grout is its shape in the grout's colour, and what lies inside its ring
-//! over that. Plain SVG 1.1 without scripts, fonts or links, the same bytes every time.
+//! tiles before they are turned are whole numbers; the view box begins at -64, since the centre of pixel (0, 0) is the
+//! origin. Masks stand once in `<defs>` (`shapes.rs`). A tile with grout is its shape in the grout's colour, and what lies
+//! inside its ring over that. A transparent picture has no background element. Plain SVG 1.1 without scripts, fonts or
+//! links, the same bytes every time.
 
 mod base64;
 mod outline;
@@ -20,7 +21,7 @@ use serde_json::{Map, Value};
 use crate::error::{Error, Result};
 use crate::model::blocks::{depth_order, index_of};
 use crate::model::target::hexadecimal;
-use crate::model::{Blend, Canvas, Fly, Population};
+use crate::model::{Backdrop, Blend, Canvas, Fly, Population};
 use crate::photo::{self, xml};
 
 use shapes::Shapes;
@@ -46,9 +47,10 @@ pub fn encode(population: &Population, canvas: &Canvas, told: &Map<String, Value
     let shapes = Shapes::of(population, &flies)?;
     let mut svg = head(canvas, flies.len(), told);
     svg.push_str(shapes.definitions());
-    let (width, height) = extent(canvas);
-    let color = hexadecimal(population.background);
-    push(&mut svg, format_args!("<path d=\"M-64-64h{width}v{height}h-{width}z\" fill=\"{color}\"/>\n"));
+    if let Backdrop::Color(color) = population.background {
+        let ((width, height), color) = (extent(canvas), hexadecimal(color));
+        push(&mut svg, format_args!("<path d=\"M-64-64h{width}v{height}h-{width}z\" fill=\"{color}\"/>\n"));
+    }
     for (number, fly) in flies.into_iter().enumerate() {
         push_fly(&mut svg, number, fly, grout);
     }

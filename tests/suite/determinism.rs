@@ -27,7 +27,7 @@ fn evolve(evaluator: Box<dyn Evaluator>, scheme: PaperScheme) -> Result {
     let population = Population {
         width_px,
         height_px,
-        background: scene.background,
+        background: scene.background.into(),
         grout: None,
         masks: (*scene.masks).clone(),
         flies: best.clone(),

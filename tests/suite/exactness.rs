@@ -45,7 +45,7 @@ pub fn population(scene: &Scene, flies: &[Fly]) -> Population {
     Population {
         width_px: scene.target.width_px(),
         height_px: scene.target.height_px(),
-        background: scene.background,
+        background: scene.background.into(),
         grout: None,
         masks: (*scene.masks).clone(),
         flies: flies.to_vec(),

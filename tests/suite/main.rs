@@ -30,6 +30,7 @@ mod shapes;
 mod snapshots;
 mod spirv;
 mod timelapse;
+mod transparency;
 mod vulkan;
 mod vulkan_failures;
 mod workshop;

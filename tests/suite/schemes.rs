@@ -75,7 +75,7 @@ fn evolve(evaluator: Box<dyn Evaluator>, scheme: &PaperScheme) -> Result {
     let evolution = &engine.evolutions()[0];
     let (flies, sae) = (evolution.best_flies().to_vec(), evolution.best_sae().expect("it was evaluated"));
     let spread = evolution.spread().clark_evans;
-    let (background, masks) = (scene.background, (*scene.masks).clone());
+    let (background, masks) = (scene.background.into(), (*scene.masks).clone());
     let population = Population { width_px, height_px, background, grout: None, masks, flies: flies.clone() };
     let mosaic = engine.evaluator().draw(&population, &Canvas::evaluation(width_px, height_px), 1).expect("it draws");
     let pairs = mosaic.pixels.as_flattened().iter().zip(scene.target.pixels().as_flattened());

@@ -199,10 +199,10 @@ mod tests {
 
     #[test]
     fn odd_sides_get_their_last_pixels_twice() {
-        let frame = Mosaic { width_px: 3, height_px: 1, pixels: vec![[1; 3], [2; 3], [3; 3]] };
+        let frame = Mosaic { width_px: 3, height_px: 1, pixels: vec![[1; 3], [2; 3], [3; 3]], alpha: None };
         let row = [1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3];
         assert_eq!(even(&frame), [row, row].concat());
-        let frame = Mosaic { width_px: 2, height_px: 2, pixels: vec![[1; 3], [2; 3], [3; 3], [4; 3]] };
+        let frame = Mosaic { width_px: 2, height_px: 2, pixels: vec![[1; 3], [2; 3], [3; 3], [4; 3]], alpha: None };
         assert_eq!(even(&frame), [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4]);
     }
 

@@ -9,7 +9,8 @@ use crate::app::snapshots::Snapshot;
 pub(in crate::app) enum Spacing {
     /// The ratio of the errors: the picture changes about as much with every frame
     Error,
-    /// The number of births: fast at first, then slow
+    /// The number of births, or of evals: fast at first, then slow
+    #[value(alias = "evals")]
     Births,
     /// Nothing: every snapshot is a frame, and --frames takes every so many
     Snapshots,
@@ -25,7 +26,7 @@ pub(in crate::app) enum Spacing {
 pub(super) fn choose(snapshots: &[Snapshot], spacing: Spacing, frame_count: Option<usize>) -> Vec<usize> {
     let places: Vec<f64> = match spacing {
         Spacing::Snapshots => (0..snapshots.len()).map(|index| index as f64).collect(),
-        Spacing::Births => snapshots.iter().map(|snapshot| snapshot.births as f64).collect(),
+        Spacing::Births => snapshots.iter().map(|snapshot| snapshot.evals as f64).collect(),
         Spacing::Error => ways(snapshots),
     };
     let (Some(&begin), Some(&end)) = (places.first(), places.last()) else { return Vec::new() };
@@ -79,7 +80,7 @@ mod tests {
     use super::*;
 
     fn course(saes: &[u64]) -> Vec<Snapshot> {
-        let snapshot = |(births, &sae)| Snapshot { path: PathBuf::new(), births, sae, key: String::new() };
+        let snapshot = |(evals, &sae)| Snapshot { path: PathBuf::new(), evals, sae, key: String::new() };
         (0..).zip(saes).map(snapshot).collect()
     }
 

@@ -204,7 +204,8 @@ impl Studio {
         if (population.width_px, population.height_px) != self.size_px {
             return Err(Error::input(&snapshot.path, "is of another size than the first snapshot; remove it"));
         }
-        population.background = self.background.unwrap_or(population.background);
+        // Films have no alpha.
+        population.background = self.background.unwrap_or(population.background.color()).into();
         self.evaluator.draw(&population, &self.canvas, self.supersampling)
     }
 }

@@ -18,7 +18,7 @@ use crate::model::Canvas;
 use crate::photo::Metadata;
 
 /// What a snapshot tells about itself alone.
-const OF_SNAPSHOT: [&str; 6] = ["births", "sae", "run", "status", "version", "software"];
+const OF_SNAPSHOT: [&str; 8] = ["births", "evals", "sae", "objective", "run", "status", "version", "software"];
 /// Keyword of the key by itself.
 const KEY_KEYWORD: &str = "smalti-key";
 /// Bytes of a file that are looked through at a time.
@@ -53,7 +53,7 @@ pub(super) fn of_animation(
     let mut told: Map<String, Value> = archive::read_meta(&snapshots[0].path)?;
     told.retain(|key, _| !OF_SNAPSHOT.contains(&key.as_str()));
     let run_key = told.remove("key");
-    let births: Vec<u64> = snapshots.iter().map(|snapshot| snapshot.births).collect();
+    let evals: Vec<u64> = snapshots.iter().map(|snapshot| snapshot.evals).collect();
     let timing = options.timing(snapshots.len());
     let specific = json!({
         "content": "timelapse",
@@ -65,7 +65,7 @@ pub(super) fn of_animation(
         "frames_per_s": timing.frames_per_s,
         "last_cs": timing.last_cs,
         "plays": timing.plays,
-        "births_shown": births,
+        "births_shown": evals,
     });
     if let Value::Object(specific) = specific {
         told.extend(specific);

@@ -2,10 +2,12 @@
 
 use multiversion::multiversion;
 
-use super::block::{Block, PIXELS, SIDE};
+pub(super) use super::block::SIDE;
+use super::block::{Block, PIXELS};
 use crate::model::cells::color::median;
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::pixel::INSIDE;
+use crate::model::cells::suit::Suit;
 
 /// Eight pixels of a row.
 pub type Lanes = [i32; SIDE];
@@ -48,12 +50,12 @@ impl Default for Shown {
 }
 
 /// A part of a block's rows inside a footprint's box.
-struct Rows {
-    first: usize,
-    last: usize,
+pub(super) struct Rows {
+    pub first: usize,
+    pub last: usize,
     /// Tile coordinates of the first pixel of the first row.
-    u: i32,
-    v: i32,
+    pub u: i32,
+    pub v: i32,
 }
 
 impl<'a> Area<'a> {
@@ -77,7 +79,7 @@ impl<'a> Area<'a> {
 
     /// Calls `visit` for the rows of each block that the box touches.
     #[inline(always)]
-    fn visit(&self, footprint: &Footprint, mut visit: impl FnMut(&Block, &Rows)) {
+    pub(super) fn visit(&self, footprint: &Footprint, mut visit: impl FnMut(&Block, &Rows)) {
         let (first_x, first_y) = (footprint.x0 >> 3, footprint.y0 >> 3);
         for row in first_y..=footprint.y1 >> 3 {
             let top = (row * 8).max(footprint.y0);
@@ -99,27 +101,18 @@ impl<'a> Area<'a> {
         is_full
     }
 
-    /// Calls `visit` for every pixel that one of two footprints covers, with its block, its place in it, and whether each of the
-    /// two covers it.
+    /// Calls `visit` for every pixel that one of two tiles covers, with its block, its place in it and in the picture, and whether each
+    /// of the two covers it.
     #[inline(always)]
-    pub fn exchange(
-        &mut self,
-        one: &Footprint,
-        other: &Footprint,
-        mut visit: impl FnMut(&mut Block, usize, [bool; 2]),
-    ) {
-        let is_apart = one.x1 < other.x0 || other.x1 < one.x0 || one.y1 < other.y0 || other.y1 < one.y0;
-        if one.is_empty() || other.is_empty() || is_apart {
-            self.exchange_in(one, (one, &Footprint::EMPTY), &mut visit);
-            self.exchange_in(other, (&Footprint::EMPTY, other), &mut visit);
+    pub fn exchange(&mut self, one: &Cover<'_>, other: &Cover<'_>, mut visit: impl FnMut(&mut Block, &Exchanged)) {
+        let (a, b) = (one.footprint, other.footprint);
+        let is_apart = a.x1 < b.x0 || b.x1 < a.x0 || a.y1 < b.y0 || b.y1 < a.y0;
+        if a.is_empty() || b.is_empty() || is_apart {
+            self.exchange_in(a, (one, &Cover::NONE), &mut visit);
+            self.exchange_in(b, (&Cover::NONE, other), &mut visit);
         } else {
-            let boxed = Footprint {
-                x0: one.x0.min(other.x0),
-                y0: one.y0.min(other.y0),
-                x1: one.x1.max(other.x1),
-                y1: one.y1.max(other.y1),
-                ..*one
-            };
+            let boxed =
+                Footprint { x0: a.x0.min(b.x0), y0: a.y0.min(b.y0), x1: a.x1.max(b.x1), y1: a.y1.max(b.y1), ..*a };
             self.exchange_in(&boxed, (one, other), &mut visit);
         }
     }
@@ -128,8 +121,8 @@ impl<'a> Area<'a> {
     fn exchange_in(
         &mut self,
         boxed: &Footprint,
-        (one, other): (&Footprint, &Footprint),
-        visit: &mut impl FnMut(&mut Block, usize, [bool; 2]),
+        (one, other): (&Cover<'_>, &Cover<'_>),
+        visit: &mut impl FnMut(&mut Block, &Exchanged),
     ) {
         if boxed.is_empty() {
             return;
@@ -141,12 +134,13 @@ impl<'a> Area<'a> {
             for column in columns.clone() {
                 let block = &mut *self.blocks[start + (column - self.first.0) as usize];
                 for y in top..=bottom {
-                    let rows = [row_bits(block, one, (column, y)), row_bits(block, other, (column, y))];
+                    let rows = [one.row_bits(block, (column, y)), other.row_bits(block, (column, y))];
                     let mut bits = rows[0] | rows[1];
                     while bits != 0 {
                         let lane = bits.trailing_zeros();
-                        let covers = [rows[0] >> lane & 1 != 0, rows[1] >> lane & 1 != 0];
-                        visit(block, (y & 7) as usize * SIDE + lane as usize, covers);
+                        let [was, is] = rows.map(|row| row >> lane & 1 != 0);
+                        let (pixel, x) = ((y & 7) as usize * SIDE + lane as usize, column * 8 + lane as i32);
+                        visit(block, &Exchanged { pixel, x, y, was, is });
                         bits &= bits - 1;
                     }
                 }
@@ -155,20 +149,57 @@ impl<'a> Area<'a> {
     }
 }
 
-/// Which of the eight pixels of a block's row the footprint covers, as bits.
-#[inline(always)]
-fn row_bits(block: &Block, f: &Footprint, (column, y): (i32, i32)) -> u32 {
-    if column < f.x0 >> 3 || column > f.x1 >> 3 || y < f.y0 || y > f.y1 {
-        return 0;
+/// A pixel that one of two tiles covers.
+#[derive(Clone, Copy, Debug)]
+pub struct Exchanged {
+    /// Its place in its block.
+    pub pixel: usize,
+    /// Its column in the picture.
+    pub x: i32,
+    /// Its row in the picture.
+    pub y: i32,
+    /// Whether the first tile covers it.
+    pub was: bool,
+    /// Whether the second one does.
+    pub is: bool,
+}
+
+/// A tile as far as the pixels that it covers go.
+#[derive(Clone, Copy, Debug)]
+pub struct Cover<'a> {
+    /// Its rectangle.
+    pub footprint: &'a Footprint,
+    /// What it wears; none if that cannot leave a hole and is not asked for.
+    pub suit: Option<&'a Suit<'a>>,
+}
+
+impl Cover<'_> {
+    /// Covers nothing.
+    pub const NONE: Self = Self { footprint: &Footprint::EMPTY, suit: None };
+
+    /// Which of the eight pixels of a block's row the tile covers, as bits.
+    #[inline(always)]
+    fn row_bits(&self, block: &Block, (column, y): (i32, i32)) -> u32 {
+        let f = self.footprint;
+        if column < f.x0 >> 3 || column > f.x1 >> 3 || y < f.y0 || y > f.y1 {
+            return 0;
+        }
+        let (u, v) = f.coordinates(column * 8, y);
+        let out = outside(u, v, f);
+        let target = row_of(&block.target, (y & 7) as usize);
+        let mut bits = 0;
+        for lane in 0..SIDE {
+            bits |= u32::from((out[lane] >= 0) & (target[lane] & INSIDE != 0)) << lane;
+        }
+        if let Some(suit) = self.suit {
+            for lane in 0..SIDE as i32 {
+                let is_hole = bits >> lane & 1 != 0
+                    && suit.look(f, (u + f.cos * lane) as u32, (v - f.sin * lane) as u32).is_none();
+                bits &= !(u32::from(is_hole) << lane);
+            }
+        }
+        bits
     }
-    let (u, v) = f.coordinates(column * 8, y);
-    let out = outside(u, v, f);
-    let target = row_of(&block.target, (y & 7) as usize);
-    let mut bits = 0;
-    for lane in 0..SIDE {
-        bits |= u32::from((out[lane] >= 0) & (target[lane] & INSIDE != 0)) << lane;
-    }
-    bits
 }
 
 /// Negative where a lane's pixel lies outside the tile.
@@ -191,7 +222,7 @@ fn row_of<T: Copy>(plane: &[T; PIXELS], row: usize) -> &[T; SIDE] {
 /// Of each pixel of a row, whether the child covers it (all ones), whether it would show there, and the error of what
 /// shows without its victim.
 #[inline(always)]
-fn compare(block: &Block, row: usize, (u, v): (i32, i32), child: &Child<'_>) -> (Lanes, Lanes, Lanes) {
+pub(super) fn compare(block: &Block, row: usize, (u, v): (i32, i32), child: &Child<'_>) -> (Lanes, Lanes, Lanes) {
     let out = outside(u, v, child.footprint);
     let (top, under) = (row_of(&block.top.fly, row), row_of(&block.under.fly, row));
     let (top_z, under_z) = (row_of(&block.top.z, row), row_of(&block.under.z, row));

@@ -2,8 +2,9 @@
 
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
-use super::area::{self, Area, Child, Shown};
-use super::block::Entry;
+use super::area::{self, Area, Child, Cover, Exchanged, Shown};
+use super::block::{Block, Entry};
+use super::dressed::{self, DressedShown};
 use multiversion::multiversion;
 
 use crate::model::cells::color::mean;
@@ -12,6 +13,7 @@ use crate::model::cells::operators::{self, Setting, slot};
 use crate::model::cells::pixel::{STACK_DEPTH, difference};
 use crate::model::cells::random::{Chain, below};
 use crate::model::cells::rules::{Acceptance, BirthKind, ColorSource, STEP_FIRST, grown, shrunk};
+use crate::model::cells::suit::Suit;
 use crate::model::cells::{Course, Grid, NO_CELL};
 use crate::model::tile::{pack, unpack};
 use crate::model::{Fly, GuideSample, NO_FLY};
@@ -64,11 +66,14 @@ pub struct Cell<'a> {
     pub number: u32,
     pub area: Area<'a>,
     pub members: Vec<Member>,
+    /// Whether no tile is dressed and all pixels count the same.
+    pub is_plain: bool,
     pub shown: Shown,
+    pub dressed: DressedShown,
     pub done: Done,
 }
 
-impl Cell<'_> {
+impl<'a> Cell<'a> {
     /// Makes all steps of the round, then removes the flies that do not help.
     pub fn run(&mut self, chain: Chain) {
         let steps = self.members.len() as u32 * self.shared.course.rules.steps_per_fly;
@@ -249,39 +254,63 @@ impl Cell<'_> {
             Child { footprint: &footprint, z: child.z as i32, fly: index, overlap: rules.penalties.overlap as i32 };
         let own =
             shared.fitness[index as usize].load(Ordering::Relaxed) + operators::turn_penalty(&child, rules, local);
-        let has_new_color = paint != Paint::Keep && rules.color != ColorSource::Evolved;
-        let (child, change) = if has_new_color {
-            self.shown.collect(&self.area, &seen);
-            if self.shown.count() == 0 && paint == Paint::Birth {
-                return None;
-            }
-            let color = self.color(&child).unwrap_or(pack(child.color()));
-            (child.with_color(unpack(color)), self.shown.change(color))
-        } else {
-            (child, area::change(&self.area, &seen, pack(child.color())))
-        };
+        let (child, change) = self.painted(&child, &seen, paint)?;
         if child == old {
             return None;
         }
         Some(Candidate { victim, fly: child, footprint, is_birth: paint == Paint::Birth, change: own + change })
     }
 
-    /// The colour of the child that was collected; none if it would show nowhere.
-    fn color(&mut self, child: &Fly) -> Option<u32> {
-        let count = self.shown.count() as u32;
-        if count == 0 {
+    /// The child with its colour, and the change that it would make to its pixels; none for a birth that would show nowhere.
+    fn painted(&mut self, child: &Fly, seen: &Child<'_>, paint: Paint) -> Option<(Fly, i64)> {
+        let source = self.shared.course.rules.color;
+        let has_new_color = paint != Paint::Keep && source != ColorSource::Evolved;
+        let old_color = pack(child.color());
+        let suit = self.suit(child);
+        let Some(suit) = &suit else {
+            if !has_new_color {
+                return Some((*child, area::change(&self.area, seen, old_color)));
+            }
+            self.shown.collect(&self.area, seen);
+            let count = self.shown.count() as u32;
+            if count == 0 && paint == Paint::Birth {
+                return None;
+            }
+            let color = match source {
+                _ if count == 0 => old_color,
+                ColorSource::Median => self.shown.median(),
+                ColorSource::Mean => pack(self.shown.sums().map(|sum| mean(sum, count))),
+                ColorSource::Pick | ColorSource::Evolved => self.picked(child),
+            };
+            return Some((child.with_color(unpack(color)), self.shown.change(color)));
+        };
+        if !has_new_color {
+            return Some((*child, dressed::change(&self.area, seen, suit, old_color)));
+        }
+        self.dressed.collect(&self.area, seen, suit);
+        if !self.dressed.shows() && paint == Paint::Birth {
             return None;
         }
-        Some(match self.shared.course.rules.color {
-            ColorSource::Median => self.shown.median(),
-            ColorSource::Mean => pack(self.shown.sums().map(|sum| mean(sum, count))),
-            ColorSource::Pick => {
-                let (x, y) = ((child.x + 32) >> 6, (child.y + 32) >> 6);
-                let target = &self.shared.course.target;
-                pack(target.pixels()[y as usize * target.width_px() as usize + x as usize])
-            }
-            ColorSource::Evolved => pack(child.color()),
-        })
+        let color = match source {
+            _ if !self.dressed.has_color() => old_color,
+            ColorSource::Median => self.dressed.median(),
+            ColorSource::Mean => self.dressed.mean(),
+            ColorSource::Pick | ColorSource::Evolved => self.picked(child),
+        };
+        Some((child.with_color(unpack(color)), self.dressed.change(color)))
+    }
+
+    /// The target's pixel nearest to a fly's centre, packed.
+    fn picked(&self, fly: &Fly) -> u32 {
+        let (x, y) = ((fly.x + 32) >> 6, (fly.y + 32) >> 6);
+        let target = &self.shared.course.target;
+        pack(target.pixels()[y as usize * target.width_px() as usize + x as usize])
+    }
+
+    /// What a fly wears; none in a plain search.
+    fn suit(&self, fly: &Fly) -> Option<Suit<'a>> {
+        let Course { masks, rules, .. } = self.shared.course;
+        (!self.is_plain && fly.alive).then(|| Suit::of(fly, masks, rules))
     }
 
     /// Whether no pixel's stack would become too deep.
@@ -291,7 +320,9 @@ impl Cell<'_> {
         }
         let victim = self.members[child.victim].index;
         let mut has_room = true;
-        self.area.exchange(&child.footprint, &Footprint::EMPTY, |block, pixel, _| {
+        let suit = self.suit(&child.fly);
+        let cover = Cover { footprint: &child.footprint, suit: suit.as_ref() };
+        self.area.exchange(&cover, &Cover::NONE, |block, &Exchanged { pixel, .. }| {
             if usize::from(block.depth[pixel]) == STACK_DEPTH {
                 has_room &= block.stack[pixel].iter().any(|entry| entry.fly == victim);
             }
@@ -312,9 +343,15 @@ impl Cell<'_> {
             fly: index,
             color: pack(child.fly.color()),
             keeps_depth: old_z == child.fly.z,
-            keeps_color: old.color() == child.fly.color(),
+            // The colour of a dressed tile at a pixel depends on its edges, too.
+            keeps_color: self.is_plain && old.color() == child.fly.color(),
         };
-        exchange(&mut self.area, &old_footprint, &child.footprint, &change);
+        let suits = [self.suit(&old), self.suit(&child.fly)];
+        let covers = [
+            Cover { footprint: &old_footprint, suit: suits[0].as_ref() },
+            Cover { footprint: &child.footprint, suit: suits[1].as_ref() },
+        ];
+        exchange(&mut self.area, &covers, &change);
         self.members[child.victim].fly = child.fly;
         if shared.course.rules.penalties.turn > 0 {
             let penalty = |fly: &Fly| {
@@ -332,7 +369,8 @@ impl Cell<'_> {
         let footprint = Footprint::of(&fly, (shared.grid.width_px, shared.grid.height_px));
         let change =
             Exchange { shared, cell: self.number, fly: index, color: 0, keeps_depth: false, keeps_color: false };
-        exchange(&mut self.area, &footprint, &Footprint::EMPTY, &change);
+        let suit = self.suit(&fly);
+        exchange(&mut self.area, &[Cover { footprint: &footprint, suit: suit.as_ref() }, Cover::NONE], &change);
         shared.fitness[index as usize].store(0, Ordering::Relaxed);
     }
 
@@ -367,7 +405,7 @@ struct Excess {
 
 impl Excess {
     #[inline(always)]
-    fn of(block: &super::block::Block, pixel: usize) -> Self {
+    fn of(block: &Block, pixel: usize) -> Self {
         let gain = i64::from(block.under.error[pixel]) - i64::from(block.top.error[pixel]);
         Self { fly: block.top.fly[pixel], gain }
     }
@@ -415,20 +453,27 @@ struct Exchange<'a> {
     keeps_color: bool,
 }
 
-/// Takes a fly off the pixels of `old` and puts it on those of `new`.
+/// Takes a fly off the pixels of one tile and puts it on those of another.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
-fn exchange(area: &mut Area<'_>, old: &Footprint, new: &Footprint, change: &Exchange<'_>) {
+fn exchange(area: &mut Area<'_>, [old, new]: &[Cover<'_>; 2], change: &Exchange<'_>) {
     let Exchange { shared, cell, fly, color, keeps_depth, keeps_color } = *change;
     let depth_of = |fly: u32| shared.depths[fly as usize].load(Ordering::Relaxed);
     let own_z = depth_of(fly);
     let is_behind = |other: u32| (own_z, fly) < (depth_of(other), other);
+    let error_at = |block: &Block, at: &Exchanged| {
+        let (target, weight) = (block.target[at.pixel], block.weight[at.pixel]);
+        let Some(suit) = new.suit else { return difference(target, color) * weight };
+        let (u, v) = new.footprint.coordinates(at.x, at.y);
+        suit.look(new.footprint, u as u32, v as u32).map_or(0, |look| suit.error(look, color, (target, weight)))
+    };
     let mut covered = 0;
-    area.exchange(old, new, |block, pixel, [was, is]| {
+    area.exchange(old, new, |block, at| {
+        let &Exchanged { pixel, was, is, .. } = at;
         if was && is && keeps_depth && keeps_color {
             return;
         }
         let before = Excess::of(block, pixel);
-        let entry = Entry { fly, error: difference(block.target[pixel], color) * block.weight[pixel] };
+        let entry = Entry { fly, error: if is { error_at(block, at) } else { 0 } };
         let mut place = usize::MAX;
         if was && is && keeps_depth {
             place = block.recolor(pixel, entry);

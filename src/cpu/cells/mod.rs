@@ -3,6 +3,7 @@
 mod area;
 mod block;
 mod cell;
+mod dressed;
 
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
@@ -11,11 +12,12 @@ use rayon::prelude::*;
 use self::area::{Area, Shown};
 use self::block::{Block, PIXELS};
 use self::cell::{Cell, Done, Member, Shared};
+use self::dressed::DressedShown;
 use crate::error::Result;
 use crate::model::blocks::{depth_order, index_of};
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
-use crate::model::cells::pixel::{BACKGROUND_Z, INSIDE, difference};
+use crate::model::cells::pixel::{BACKGROUND_Z, INSIDE, TRANSPARENT, difference};
 use crate::model::cells::random::{Chain, Draw};
 use crate::model::cells::rules::STEP_FIRST;
 use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, operators};
@@ -69,11 +71,19 @@ impl CpuSearch {
             let (x, y) = (number as u32 % self.columns * BLOCK_SIDE_PX, number as u32 / self.columns * BLOCK_SIDE_PX);
             for row in 0..BLOCK_SIDE_PX.min(height - y) {
                 for column in 0..BLOCK_SIDE_PX.min(width - x) {
-                    let color = pack(target.pixels()[((y + row) * width + x + column) as usize]);
+                    let place = ((y + row) * width + x + column) as usize;
+                    let color = pack(target.pixels()[place]);
                     let pixel = (row * BLOCK_SIDE_PX + column) as usize;
-                    block.target[pixel] = color | INSIDE;
-                    let ground = difference(color, rules.background);
-                    block.ground[pixel] = ground + (rules.penalties.hole + rules.penalties.overlap) as i32;
+                    let weight = target.weights().map_or(1, |weights| i32::from(weights[place]));
+                    let is_unwanted = target.transparent().is_some_and(|transparent| transparent[place]);
+                    let (flag, bare) = if is_unwanted {
+                        (TRANSPARENT, 0)
+                    } else {
+                        (0, difference(color, rules.background) * weight + rules.penalties.hole as i32)
+                    };
+                    block.target[pixel] = color | INSIDE | flag;
+                    block.weight[pixel] = weight;
+                    block.ground[pixel] = bare + rules.penalties.overlap as i32;
                     block.surface(pixel, |_| BACKGROUND_Z as i32);
                 }
             }
@@ -114,6 +124,7 @@ impl CpuSearch {
             self.size_px(),
             cell_side_px(self.course.rules.side),
         );
+        let is_plain = self.course.is_plain();
         let members = self.deal(&grid);
         let shared = Shared {
             course: &self.course,
@@ -139,7 +150,16 @@ impl CpuSearch {
                 let first = ((x0 / BLOCK_SIDE_PX) as i32, (y0 / BLOCK_SIDE_PX) as i32);
                 let area = Area::new(blocks, columns, first);
                 let shared = &shared;
-                let mut cell = Cell { shared, number, area, members, shown: Shown::default(), done: Done::default() };
+                let mut cell = Cell {
+                    shared,
+                    number,
+                    area,
+                    members,
+                    is_plain,
+                    shown: Shown::default(),
+                    dressed: DressedShown::default(),
+                    done: Done::default(),
+                };
                 cell.run(chain.then(number));
                 (cell.members, cell.done)
             })
@@ -210,10 +230,19 @@ impl Search for CpuSearch {
             fitness: &self.fitness,
             depths: &self.depths,
         };
+        let is_plain = self.course.is_plain();
         let area = Area::new(self.blocks.iter_mut().collect(), self.columns as usize, (0, 0));
         let members = (0..).zip(flies).map(|(index, _)| Member { index, fly: Fly::ABSENT, step: STEP_FIRST }).collect();
-        let mut cell =
-            Cell { shared: &shared, number: 0, area, members, shown: Shown::default(), done: Done::default() };
+        let mut cell = Cell {
+            shared: &shared,
+            number: 0,
+            area,
+            members,
+            is_plain,
+            shown: Shown::default(),
+            dressed: DressedShown::default(),
+            done: Done::default(),
+        };
         // Nearest first, so that it is the deepest flies that find no room.
         for key in depth_order(flies) {
             let index = index_of(key) as usize;

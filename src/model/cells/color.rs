@@ -27,11 +27,30 @@ pub fn median(values: &[u8]) -> u8 {
     median
 }
 
-/// The mean, rounded half up.
+/// As [`median`], of values that count as often as their weights say: the smallest value such that more than
+/// `(sum of weights - 1) / 2` of the weight lies at or below it.
+#[inline(always)]
+#[must_use]
+pub fn weighted_median(values: &[u8], weights: &[u8]) -> u8 {
+    let total: u32 = weights.iter().map(|&weight| u32::from(weight)).sum();
+    let rank = (total - 1) / 2;
+    let mut median = 0_u8;
+    for bit in (0..8).rev() {
+        let trial = median | 1 << bit;
+        let below: u32 =
+            values.iter().zip(weights).map(|(&value, &weight)| u32::from(value < trial) * u32::from(weight)).sum();
+        if below <= rank {
+            median = trial;
+        }
+    }
+    median
+}
+
+/// The mean of values of this sum and number (or weight), rounded half up.
 #[inline]
 #[must_use]
 pub fn mean(sum: u32, count: u32) -> u8 {
-    ((2 * sum + count) / (2 * count)) as u8
+    (sum / count + u32::from(sum % count >= count.div_ceil(2))) as u8
 }
 
 #[cfg(test)]
@@ -52,5 +71,26 @@ mod tests {
             sorted.sort_unstable();
             assert_eq!(median(&values), sorted[(length - 1) / 2], "{values:?}");
         }
+    }
+
+    #[test]
+    fn the_weighted_median_is_that_of_repeated_values() {
+        let values: Vec<u8> = (0..99_u32).map(|place| (crate::model::cells::random::hash(place) >> 24) as u8).collect();
+        let weights: Vec<u8> =
+            (0..99_u32).map(|place| 1 + (crate::model::cells::random::hash(!place) >> 28) as u8).collect();
+        for count in 1..99 {
+            let repeated: Vec<u8> = values[..count]
+                .iter()
+                .zip(&weights)
+                .flat_map(|(&value, &weight)| std::iter::repeat_n(value, usize::from(weight)))
+                .collect();
+            assert_eq!(weighted_median(&values[..count], &weights[..count]), median(&repeated), "{count} values");
+        }
+    }
+
+    #[test]
+    fn means_are_rounded_half_up_and_their_sums_may_be_large() {
+        assert_eq!([(5, 2), (4, 3), (7, 2), (0, 9)].map(|(sum, count)| mean(sum, count)), [3, 1, 4, 0]);
+        assert_eq!(mean(255 * 16_000_000, 16_000_000), 255);
     }
 }

@@ -12,6 +12,7 @@ pub mod pixel;
 pub mod random;
 pub mod rules;
 pub mod search;
+pub mod suit;
 
 pub use footprint::Footprint;
 pub use grid::{Grid, NO_CELL};

@@ -13,7 +13,7 @@ pub const INSIDE: u32 = 1 << 24;
 /// Highest byte of a target word: no tile is wanted at this pixel.
 pub const TRANSPARENT: u32 = 1 << 25;
 /// The error of any tile at a pixel where none is wanted.
-pub const UNWANTED_ERROR: u32 = 765;
+pub const UNWANTED_ERROR: i32 = 765;
 
 /// Sum of the absolute differences of three 8-bit channels.
 #[inline(always)]

@@ -21,6 +21,17 @@ pub struct Course {
     pub fly_count: usize,
 }
 
+impl Course {
+    /// Whether all tiles are squares of one colour without grout, and all pixels count the same: evaluators have a faster way for that.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.masks.layers().len() == 1
+            && self.rules.grout == 0
+            && self.target.weights().is_none()
+            && self.target.transparent().is_none()
+    }
+}
+
 /// How far a search has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Standing {

@@ -24,7 +24,7 @@ pub fn population() -> Population {
     Population {
         width_px: SIDE_PX,
         height_px: SIDE_PX,
-        background: [1, 2, 3],
+        background: [1, 2, 3].into(),
         grout: None,
         masks: masks.expect("two layers"),
         flies,

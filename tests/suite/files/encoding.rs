@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use smalti::photo::{
-    Format, Metadata, Photo, ReadOptions, encode, encode_jpeg, encode_png, read, read_jpeg_metadata, read_metadata,
-    read_png_metadata,
+    Format, Metadata, Photo, ReadOptions, encode, encode_jpeg, encode_png, encode_with_alpha, read, read_jpeg_metadata,
+    read_metadata, read_png_metadata,
 };
 
 use super::{load, photo_path, short_hash};
@@ -146,4 +146,26 @@ fn pixels_with_alpha_come_back_as_they_were() {
     let decoded = image::load_from_memory(&png).expect("it can be decoded").to_rgba8();
     assert_eq!((decoded.dimensions(), decoded.as_raw().as_slice()), ((5, 7), pixels.as_flattened()));
     assert!(smalti::photo::encode_png_with_alpha(5, 6, &pixels, &vec![]).is_err());
+}
+
+#[test]
+fn pictures_with_alpha_keep_it_and_their_metadata_and_a_jpeg_shows_them_over_black() {
+    let photo = load("rgb.png");
+    let alpha: Vec<u8> = (0..photo.pixels.len()).map(|index| (index * 7) as u8).collect();
+    let metadata = metadata(&[("smalti", "seed 7")]);
+    let pixels = photo.pixels.iter().zip(&alpha).flat_map(|(&[r, g, b], &a)| [r, g, b, a]);
+    let pixels: Vec<u8> = pixels.collect();
+    for format in [Format::Png, Format::WebP] {
+        let bytes = encode_with_alpha(format, &photo, Some(&alpha), &metadata).expect("it can be encoded");
+        let found = image::load_from_memory(&bytes).expect("it is a picture");
+        assert!(found.color().has_alpha() && found.to_rgba8().as_raw() == &pixels, "{format:?}");
+        assert_eq!(with_file(&bytes, read_metadata).expect("it can be read"), metadata, "{format:?}");
+        let opaque = encode_with_alpha(format, &photo, None, &metadata).expect("it can be encoded");
+        assert_eq!(opaque, encode(format, &photo, &metadata).expect("it can be encoded"), "{format:?}");
+        assert!(encode_with_alpha(format, &photo, Some(&alpha[1..]), &metadata).is_err(), "{format:?}");
+    }
+    let over_black = |(color, &a): (&[u8; 3], &u8)| color.map(|c| ((u32::from(c) * u32::from(a) + 127) / 255) as u8);
+    let over_black = Photo { pixels: photo.pixels.iter().zip(&alpha).map(over_black).collect(), ..photo };
+    let found = encode_with_alpha(JPEG, &photo, Some(&alpha), &metadata).expect("it can be encoded");
+    assert_eq!(found, encode(JPEG, &over_black, &metadata).expect("it can be encoded"));
 }

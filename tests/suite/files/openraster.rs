@@ -6,7 +6,7 @@ use image::{RgbImage, RgbaImage};
 use smalti::cpu::CpuEvaluator;
 use smalti::model::{Canvas, Evaluator, Fly, Grout, MaskSet, Mosaic, Population};
 use smalti::openraster::{self, Layers};
-use smalti::photo::{self, Photo};
+use smalti::photo::{self, Format, Photo};
 use zip::ZipArchive;
 
 use crate::scenarios::{holed_masks, scenarios};
@@ -53,8 +53,9 @@ fn composed(ora: &[u8]) -> RgbImage {
 
 fn merged(population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<u8> {
     let drawn = CpuEvaluator::new(vec![]).draw(population, canvas, supersampling);
-    let Mosaic { width_px, height_px, pixels } = drawn.expect("the twin draws anything");
-    photo::encode_png(&Photo { width_px, height_px, pixels }, &vec![("smalti".to_owned(), "{}".to_owned())]).unwrap()
+    let Mosaic { width_px, height_px, pixels, alpha } = drawn.expect("the twin draws anything");
+    let (photo, told) = (Photo { width_px, height_px, pixels }, vec![("smalti".to_owned(), "{}".to_owned())]);
+    photo::encode_with_alpha(Format::Png, &photo, alpha.as_deref(), &told).unwrap()
 }
 
 fn encoded(population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<u8> {
@@ -68,7 +69,7 @@ fn populations() -> impl Iterator<Item = (&'static str, Population)> {
     few.filter(|scenario| scenario.scene.target.width_px() < 1000).map(|scenario| {
         let (target, masks) = (&scenario.scene.target, (*scenario.scene.masks).clone());
         let (width_px, height_px) = (target.width_px(), target.height_px());
-        let background = [1, 130, 255];
+        let background = [1, 130, 255].into();
         (scenario.name, Population { width_px, height_px, background, grout: None, masks, flies: scenario.flies })
     })
 }
@@ -114,7 +115,7 @@ fn the_bands_have_their_place_in_depth_and_the_background_a_layer_of_its_own() {
     let population = Population {
         width_px: 40,
         height_px: 4,
-        background: [0, 9, 0],
+        background: [0, 9, 0].into(),
         grout: None,
         masks,
         flies: (0..9).rev().map(fly).collect(),
@@ -136,8 +137,14 @@ fn the_bands_have_their_place_in_depth_and_the_background_a_layer_of_its_own() {
 #[test]
 fn a_population_without_a_living_fly_has_a_background_only() {
     let masks = MaskSet::default();
-    let population =
-        Population { width_px: 5, height_px: 4, background: [7; 3], grout: None, masks, flies: vec![Fly::ABSENT; 3] };
+    let population = Population {
+        width_px: 5,
+        height_px: 4,
+        background: [7; 3].into(),
+        grout: None,
+        masks,
+        flies: vec![Fly::ABSENT; 3],
+    };
     let ora = encoded(&population, &Canvas::evaluation(5, 4), 1);
     assert_eq!(stacked(&ora).len(), 1);
     assert!(composed(&ora).pixels().all(|pixel| pixel.0 == [7; 3]));

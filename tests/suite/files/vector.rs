@@ -27,7 +27,7 @@ fn drawn_by_resvg(svg: &[u8]) -> Mosaic {
         assert_eq!(a, 255, "the background is everywhere");
         [r, g, b]
     });
-    Mosaic { width_px: size.width(), height_px: size.height(), pixels: pixels.collect() }
+    Mosaic { width_px: size.width(), height_px: size.height(), pixels: pixels.collect(), alpha: None }
 }
 
 fn drawn(population: &Population, canvas: &Canvas) -> Mosaic {
@@ -44,7 +44,7 @@ fn numbered(population: &Population) -> Population {
     let unshaded = |mask: &Mask| Mask::new(mask.texels().iter().map(|&texel| Texel { shade: 255, ..texel }).collect());
     let masks = population.masks.layers()[1..].iter().map(|mask| unshaded(mask).unwrap()).collect();
     let masks = MaskSet::with_layers(masks).unwrap();
-    Population { background: [255; 3], grout: None, flies, masks, ..*population }
+    Population { background: [255; 3].into(), grout: None, flies, masks, ..*population }
 }
 
 /// Compares every pixel whose samples, and the row of samples around them, all see one fly: resvg must give each channel a
@@ -96,7 +96,7 @@ fn population_of(scene: &Scene, flies: Vec<Fly>) -> Population {
     Population {
         width_px: scene.target.width_px(),
         height_px: scene.target.height_px(),
-        background: scene.background,
+        background: scene.background.into(),
         grout: None,
         masks: (*scene.masks).clone(),
         flies,
@@ -189,8 +189,14 @@ fn a_translucent_tile_shows_what_lies_behind_as_far_as_its_coverage_lets_it() {
     let (centre, side) = (32 * 7, 64 * 40);
     let [x, y, w, h] = [centre, centre, side, side];
     let fly = Fly { x, y, w: w as u32, h: h as u32, r: 65_535, g: 0, b: 32_896, mask: 1, alive: true, ..Fly::ABSENT };
-    let population =
-        Population { width_px: 8, height_px: 8, background: [0, 200, 100], grout: None, masks, flies: vec![fly] };
+    let population = Population {
+        width_px: 8,
+        height_px: 8,
+        background: [0, 200, 100].into(),
+        grout: None,
+        masks,
+        flies: vec![fly],
+    };
     let svg = vector::encode(&population, &Canvas::evaluation(8, 8), &Map::new()).unwrap();
     let found = drawn_by_resvg(&svg);
     // A fifth of (255, 0, 128) on the left, four fifths of its half on the right.

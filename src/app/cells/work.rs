@@ -1,0 +1,55 @@
+//! The work of the `cells` scheme: search, draw, and check what was drawn.
+
+use super::CellsOptions;
+use super::curve::SearchCurve;
+use crate::app::curve_file::Tabled;
+use crate::app::device::{Opened, OpenedSearch, Selected};
+use crate::app::job::Job;
+use crate::app::options::EvolveOptions;
+use crate::app::progress::Progress;
+use crate::app::provenance::{Course, Ending};
+use crate::app::report::{self, Row};
+use crate::app::result::{self, Evolved};
+use crate::app::run::check_messages;
+use crate::app::watch::{Watch, Watchers};
+use crate::error::Result;
+use crate::evolve::{Spread, cells};
+use crate::model::cells::SearchState;
+
+/// Searches for the mosaic of a job, records its curve if one is asked for, and draws it; the device is closed before it
+/// returns.
+pub(in crate::app) fn search_job(
+    options: &EvolveOptions,
+    job: &Job,
+    (cells, selected): (&CellsOptions, &Selected),
+    watchers: &mut Watchers<'_>,
+    row: &mut Row,
+) -> Result<Evolved> {
+    let budget = cells.budget(job.fly_count);
+    let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress)).of_search(budget.evals);
+    let OpenedSearch { mut search, validation_log } = selected.open_search(job.course(cells))?;
+    let mut curve = (!options.curves.is_empty()).then(|| SearchCurve::new(budget.evals));
+    let given = job.given_flies(cells.seed);
+    let ran = cells::run(&mut *search, given.as_deref(), &budget, &mut (&mut watch, &mut curve));
+    let stop = watch.finish_search(&mut *search).and_then(|took| {
+        row.evolve_ms = report::milliseconds(took);
+        ran
+    })?;
+    if let Some(curve) = &mut curve {
+        curve.finish(&mut *search)?;
+    }
+    let standing = search.standing();
+    let ending = Ending::new(stop, cells::sae(&mut *search)?, Course::Cells(standing));
+    let SearchState { flies, fitness, .. } = search.read_back()?;
+    drop(search);
+    row.note_search(&ending, &standing, &flies);
+    row.spread = Spread::of(&flies, job.target.width_px(), job.target.height_px()).clark_evans;
+    validation_log.map_or(Ok(()), |log| check_messages(&log))?;
+
+    let Opened { mut evaluator, validation_log } = selected.open(vec![job.scene()])?;
+    let (drawn, psnr) = result::draw(&mut *evaluator, options, (job.population(flies), fitness), ending.sae)?;
+    row.psnr = psnr;
+    drop(evaluator);
+    validation_log.map_or(Ok(()), |log| check_messages(&log))?;
+    Ok(Evolved { ending, drawn, curve: curve.map(|curve| Box::new(curve) as Box<dyn Tabled>) })
+}

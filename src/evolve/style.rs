@@ -1,0 +1,195 @@
+//! Styles of the cells search: named sets of bounds, penalties, masks and start.
+//!
+//! Lengths are multiples of d, the mean side of a tile (paper Eq. 1), so that a style looks alike at every size and number
+//! of tiles. All numbers are integers: they decide the picture.
+
+use crate::model::Rgb;
+use crate::model::cells::Rules;
+use crate::model::cells::rules::{ASPECT_FREE_Q8, Births, Bounds, CLASSES_MAX, Class, Mix, ONE_Q16, Penalties};
+use crate::model::tables::size_factor_q16;
+use crate::model::tile::pack;
+
+/// Fixed-point one of lengths over d.
+const ONE_Q8: u32 = 256;
+
+/// Where the guide of a style comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum GuideKind {
+    /// The edges themselves; without them tiles are turned at random.
+    Edges,
+    /// Directions that flow along the contours and on into flat areas, and sizes that follow the detail.
+    Flow {
+        /// Over how many mean sides, in 1/256, directions are smoothed.
+        smoothing_q8: u32,
+        /// How much sizes follow the detail, 0 to 256.
+        size_strength_q8: u32,
+    },
+}
+
+/// A share of the tiles that have a size of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ClassStyle {
+    /// Its share of the population, over 65,536; the last class takes the rest.
+    pub share_q16: u32,
+    /// Its side over d, in 1/256.
+    pub scale_q8: u32,
+    /// The first round in which its tiles are laid.
+    pub first_round: u32,
+}
+
+/// What makes a picture look as it does.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Style {
+    /// Smallest side over the tile's own, in 1/256.
+    pub side_min_q8: u32,
+    /// Largest side over the tile's own, in 1/256.
+    pub side_max_q8: u32,
+    /// Largest ratio of the sides, in 1/256; 64 and more is any.
+    pub aspect_max_q8: u32,
+    /// Smallest side of a newborn tile over its own, in 1/256.
+    pub birth_min_q8: u32,
+    /// Largest side of a newborn tile over its own, in 1/256.
+    pub birth_max_q8: u32,
+    /// Cost of each further tile on a pixel.
+    pub overlap: u32,
+    /// Cost of each pixel that no tile covers.
+    pub hole: u32,
+    /// Cost of a tile turned 45 degrees off the guide, per pixel of its area.
+    pub turn: u32,
+    /// Standard deviation of the angle of newborn tiles around the guide, in 1/65536 of a turn.
+    pub angle_spread: u32,
+    /// Coherence from which newborn tiles always follow the guide, 0 to 255.
+    pub coherence: u32,
+    /// Where directions and sizes come from.
+    pub guide: GuideKind,
+    /// Width of the ring of grout over d, in 1/256; 0 is none.
+    pub grout_q8: u32,
+    /// Parts of the population with tiles of their own size, 1 to 4.
+    pub classes: Vec<ClassStyle>,
+    /// Names of the masks that tiles wear unless others are asked for; none is the square.
+    pub masks: Vec<String>,
+}
+
+impl Style {
+    /// All names, the default first.
+    pub const NAMES: [&'static str; 4] = ["free", "mosaic", "paint", "spray"];
+
+    /// The style of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "free" => Self::free(),
+            "mosaic" => Self::mosaic(),
+            "paint" => Self::paint(),
+            _ => return None,
+        })
+    }
+
+    /// The closest likeness: no penalty, and tiles of any shape.
+    #[must_use]
+    pub fn free() -> Self {
+        Self {
+            side_min_q8: 1,
+            side_max_q8: 8 * ONE_Q8,
+            aspect_max_q8: ASPECT_FREE_Q8,
+            birth_min_q8: 20,
+            birth_max_q8: 6 * ONE_Q8,
+            overlap: 0,
+            hole: 0,
+            turn: 0,
+            angle_spread: 400,
+            coherence: 128,
+            guide: GuideKind::Edges,
+            grout_q8: 0,
+            classes: vec![ClassStyle { share_q16: ONE_Q16, scale_q8: ONE_Q8, first_round: 0 }],
+            masks: Vec::new(),
+        }
+    }
+
+    /// Whole tiles side by side in rows along the contours, with grout between them: opus vermiculatum.
+    #[must_use]
+    pub fn mosaic() -> Self {
+        Self {
+            side_min_q8: ONE_Q8 * 6 / 10,
+            side_max_q8: ONE_Q8 * 16 / 10,
+            aspect_max_q8: ONE_Q8 * 16 / 10,
+            birth_min_q8: ONE_Q8 * 7 / 10,
+            birth_max_q8: ONE_Q8 * 14 / 10,
+            overlap: 20,
+            hole: 120,
+            turn: 60,
+            angle_spread: 65_536 / 120,
+            coherence: 0,
+            guide: GuideKind::Flow { smoothing_q8: 2 * ONE_Q8, size_strength_q8: 160 },
+            grout_q8: 16,
+            ..Self::free()
+        }
+    }
+
+    /// Brush strokes along the contours, broad ones first.
+    #[must_use]
+    pub fn paint() -> Self {
+        Self {
+            side_min_q8: ONE_Q8 * 4 / 10,
+            side_max_q8: ONE_Q8 * 4,
+            aspect_max_q8: ONE_Q8 * 6,
+            birth_min_q8: ONE_Q8 * 5 / 10,
+            birth_max_q8: ONE_Q8 * 3,
+            turn: 0,
+            angle_spread: 65_536 / 40,
+            coherence: 0,
+            guide: GuideKind::Flow { smoothing_q8: ONE_Q8, size_strength_q8: 128 },
+            classes: vec![
+                ClassStyle { share_q16: ONE_Q16 / 10, scale_q8: 5 * ONE_Q8 / 2, first_round: 0 },
+                ClassStyle { share_q16: ONE_Q16 * 3 / 10, scale_q8: ONE_Q8 * 3 / 2, first_round: 4 },
+                ClassStyle { share_q16: ONE_Q16 * 6 / 10, scale_q8: ONE_Q8 * 8 / 10, first_round: 8 },
+            ],
+            masks: vec!["brush".to_owned()],
+            ..Self::free()
+        }
+    }
+
+    /// The rules of the style for `fly_count` tiles of the mean side `side` (1/64 px) over `background`, with grout of
+    /// `grout_color`.
+    #[must_use]
+    pub fn rules(&self, seed: u64, (side, fly_count): (u32, usize), background: Rgb, grout_color: Rgb) -> Rules {
+        let base = Rules::free(seed, side, fly_count, background);
+        let mut classes = base.classes;
+        let mut share_q16 = 0;
+        for (class, style) in classes.iter_mut().zip(&self.classes) {
+            share_q16 = (share_q16 + style.share_q16).min(ONE_Q16);
+            let end = (fly_count as u64 * u64::from(share_q16)) >> 16;
+            *class = Class { end: end as u32, scale_q12: style.scale_q8 << 4, first_round: style.first_round };
+        }
+        Rules {
+            births: Births {
+                side_low: logarithm(self.birth_min_q8),
+                side_high: logarithm(self.birth_max_q8),
+                aspect_high: if self.aspect_max_q8 >= ASPECT_FREE_Q8 { 1_024 } else { logarithm(self.aspect_max_q8) },
+                angle_spread: self.angle_spread,
+                coherence_range: self.coherence,
+                ..base.births
+            },
+            bounds: Bounds {
+                side_min_q8: self.side_min_q8,
+                side_max_q8: self.side_max_q8,
+                aspect_max_q8: self.aspect_max_q8,
+                local_size: u32::from(matches!(self.guide, GuideKind::Flow { .. })),
+            },
+            penalties: Penalties { overlap: self.overlap, hole: self.hole, turn: self.turn },
+            mix: Mix { ..base.mix },
+            classes,
+            class_count: self.classes.len().clamp(1, CLASSES_MAX) as u32,
+            grout: (base.side * self.grout_q8) >> 8,
+            grout_color: pack(grout_color),
+            ..base
+        }
+    }
+}
+
+/// The natural logarithm of `value_q8` / 256 in steps of 1/256, as the table of size factors has it: the largest step whose
+/// factor is at most the value.
+fn logarithm(value_q8: u32) -> i32 {
+    let value_q16 = u64::from(value_q8) << 8;
+    (-1_024..=1_024).rev().find(|&step| size_factor_q16(step) <= value_q16).unwrap_or(-1_024)
+}
