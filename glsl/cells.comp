@@ -21,14 +21,20 @@ layout(constant_id = 3) const uint MUTANTS = 0u;
 layout(constant_id = 4) const uint RANDOM_DEPTH = 0u;
 layout(constant_id = 5) const uint TURN_PENALTY = 1u;
 layout(constant_id = 6) const uint LOCAL_SIZE = 1u;
+// 1: tiles wear masks or grout, or pixels do not all count the same.
+layout(constant_id = 7) const uint DRESSED = 1u;
 
 const uint LANES = gl_WorkGroupSize.x;
 
+#define MASK_BINDING 12
+#include "shared/tile.glsl"
+#include "shared/mask.glsl"
 #include "shared/cells_random.glsl"
 #include "shared/cells_state.glsl"
 #include "shared/cells_footprint.glsl"
 #include "shared/cells_grid.glsl"
 #include "shared/cells_pixel.glsl"
+#include "shared/cells_suit.glsl"
 #include "shared/cells_patches.glsl"
 
 layout(std430, binding = 7) coherent buffer StepsBuffer { uint steps[]; };
@@ -37,7 +43,8 @@ layout(std430, binding = 8) coherent buffer FitnessBuffer { int fitness[]; };
 layout(std430, binding = 9) readonly buffer GuideBuffer { uvec2 guide[]; };
 // Per pixel 16 flies, nearest first, and their errors; in each block of 8x8 first the nearest of all pixels.
 layout(std430, binding = 10) coherent buffer StacksBuffer { uvec2 stacks[]; };
-// Per cell the targets of the pixels where a child shows, a column for each invocation.
+// Per cell the pixels where a child shows its colour, a column for each invocation: the target; of dressed tiles the colour that
+// would show it and the weight less 1, then target and shade.
 layout(std430, binding = 11) coherent buffer ScratchBuffer { uint scratch[]; };
 
 layout(push_constant) uniform Push {
@@ -159,7 +166,7 @@ uvec3 worst_pixel(uint draws) {
         uvec2 pixel = bounds.xy
             + uvec2(below(bits << 16, bounds.z - bounds.x), below(bits & 0xFFFF0000u, bounds.w - bounds.y));
         uvec4 shown = pixels[2u * pixel_place(pixel)];
-        best = int(shown.w) > worst ? uvec3(pixel, shown.z) : best;
+        best = int(shown.w) > worst ? uvec3(pixel, shown.z & TOP_Z_MASK) : best;
         worst = max(int(shown.w), worst);
     }
     return best;
@@ -241,73 +248,100 @@ Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uin
 
 // What a child would do to the pixels of its box.
 struct Seen {
-    // What its pixels add to the change of the objective; without its errors where it shows if its colour is to be found.
+    // What its pixels add to the change of the objective; where its colour is to be found, without the errors of its colour.
     int change;
-    // Pixels where it would show.
-    uint count;
-    // Of those, how many this invocation put in the scratch.
+    // Weight of the pixels in the scratch, and how many of them are this invocation's.
+    uint weight;
     uint own_count;
     // Whether some pixel that it covers has a full stack.
     bool is_crowded;
+    // Whether it would show anywhere.
+    bool is_shown;
+    // Weighted sums of the channels, for means.
     uvec3 sums;
 };
 
-// Looks at the pixels of a child. Its colour may be still to be found: then its shown pixels are put in the scratch.
+const uint SCRATCH_WORDS = 1u + DRESSED;
+
+uint scratch_place(uint place, uint word) {
+    return cell_number * rules[0].scratch_words + (place * SCRATCH_WORDS + word) * LANES + gl_LocalInvocationID.x;
+}
+
+uvec3 channels_of(uint color) {
+    return uvec3(color, color >> 8, color >> 16) & 255u;
+}
+
+int scratch_weight(uint word) {
+    return DRESSED == 0u ? 1 : int(word >> 24) + 1;
+}
+
+// Looks at the pixels of a child. Its colour may be still to be found: then the pixels that show it are put in the scratch.
 Seen look(Fly child, uint index, Footprint footprint, bool has_color) {
     uint color = fly_color(child);
+    Tile suit = suit_of(child);
     int change = 0;
+    uint weight = 0u;
     uint count = 0u;
     uint crowded = 0u;
+    uint shows = 0u;
     uvec3 sums = uvec3(0u);
-    uint scratch_place = cell_number * rules[0].scratch_words + gl_LocalInvocationID.x;
     ivec4 box = footprint.box;
     ivec2 offset = lane_offset();
     for (int y = box.y; y <= box.w; y += PATCH_HEIGHT) {
         for (int x = first_column(box); x <= box.z; x += PATCH_WIDTH) {
             ivec2 pixel = ivec2(x, y) + offset;
-            if (footprint_covers(footprint, pixel)) {
+            uint look = look_of(footprint, suit, pixel);
+            if (look != LOOK_HOLE) {
                 uint place = 2u * pixel_place(uvec2(pixel));
                 uvec4 top = pixels[place];
-                uint target = top.x;
-                uvec3 shown = top.yzw;
+                uint target = top.x & 0xFFFFFFu;
+                uvec3 shown = uvec3(top.y, top_z(top.z), top.w);
                 if (shown.x == index) {
                     shown = pixels[place + 1u].xyz;
                 }
-                crowded |= target >> 24 == STACK_DEPTH ? 1u : 0u;
+                crowded |= top.x >> 24 == STACK_DEPTH ? 1u : 0u;
                 change += int(rules[0].overlap);
                 if (child.z < shown.y || child.z == shown.y && index < shown.x) {
+                    Want want = want_of(top.z);
+                    shows = 1u;
                     change -= int(shown.z);
-                    if (has_color) {
-                        change += difference(target, color);
+                    if (has_color || DRESSED == 1u && (look == LOOK_GROUT || want.is_unwanted)) {
+                        change += look_error(look, color, target, want);
                     } else {
+                        uint bright = DRESSED == 0u ? target : unshaded(target, look);
                         if (COLOR_SOURCE == COLOR_MEAN) {
-                            sums += uvec3(target, target >> 8, target >> 16) & 255u;
+                            sums += channels_of(bright) * uint(want.weight);
                         }
-                        scratch[scratch_place + count * LANES] = target;
+                        if (DRESSED == 0u) {
+                            scratch[scratch_place(count, 0u)] = target;
+                        } else {
+                            scratch[scratch_place(count, 0u)] = bright | uint(want.weight) - 1u << 24;
+                            scratch[scratch_place(count, 1u)] = target | look << 24;
+                        }
+                        weight += uint(want.weight);
+                        ++count;
                     }
-                    ++count;
                 }
             }
         }
     }
-    ivec4 all = sum_all(ivec4(change, count, crowded, 0));
+    ivec4 all = sum_all(ivec4(change, weight, crowded, shows));
     if (COLOR_SOURCE == COLOR_MEAN) {
         sums = uvec3(sum_all(ivec4(sums, 0)).xyz);
     }
-    return Seen(all.x, uint(all.y), count, all.z != 0, sums);
+    return Seen(all.x, uint(all.y), count, all.z != 0, all.w != 0, sums);
 }
 
-// The medians of the channels of the targets in the scratch, bit by bit. Twin: src/model/cells/color.rs.
-uint median_color(uint count, uint own_count) {
-    uint scratch_place = cell_number * rules[0].scratch_words + gl_LocalInvocationID.x;
-    int rank = int(count - 1u) / 2;
+// The weighted medians of the channels in the scratch, bit by bit. Twin: src/model/cells/color.rs.
+uint median_color(uint weight, uint own_count) {
+    int rank = int(weight - 1u) / 2;
     uvec3 median = uvec3(0u);
     for (uint bit = 128u; bit > 0u; bit >>= 1) {
         uvec3 trial = median | bit;
         ivec3 below_trial = ivec3(0);
         for (uint place = 0u; place < own_count; ++place) {
-            uint target = scratch[scratch_place + place * LANES];
-            below_trial += ivec3(lessThan(uvec3(target, target >> 8, target >> 16) & 255u, trial));
+            uint word = scratch[scratch_place(place, 0u)];
+            below_trial += ivec3(lessThan(channels_of(word), trial)) * scratch_weight(word);
         }
         below_trial = sum_all(ivec4(below_trial, 0)).xyz;
         median = uvec3(
@@ -318,12 +352,17 @@ uint median_color(uint count, uint own_count) {
     return median.x | median.y << 8 | median.z << 16;
 }
 
-// Sum of the errors of a colour over the targets in the scratch.
+// Sum of the errors of a colour over the pixels in the scratch.
 int scratch_error(uint color, uint own_count) {
-    uint scratch_place = cell_number * rules[0].scratch_words + gl_LocalInvocationID.x;
     int error = 0;
     for (uint place = 0u; place < own_count; ++place) {
-        error += difference(scratch[scratch_place + place * LANES], color);
+        uint word = scratch[scratch_place(place, 0u)];
+        if (DRESSED == 0u) {
+            error += difference(word, color);
+        } else {
+            uint target = scratch[scratch_place(place, 1u)];
+            error += difference(target, shaded(color, target >> 24)) * scratch_weight(word);
+        }
     }
     return sum_all(ivec4(error, 0, 0, 0)).x;
 }
@@ -331,14 +370,14 @@ int scratch_error(uint color, uint own_count) {
 uint found_color(Fly child, Seen seen) {
     uint color = fly_color(child);
     if (COLOR_SOURCE == COLOR_MEDIAN) {
-        uint median = median_color(seen.count, seen.own_count);
-        color = seen.count > 0u ? median : color;
+        uint median = median_color(seen.weight, seen.own_count);
+        color = seen.weight > 0u ? median : color;
     } else if (COLOR_SOURCE == COLOR_MEAN) {
-        uvec3 mean = (2u * seen.sums + seen.count) / max(2u * seen.count, 1u);
-        color = seen.count > 0u ? mean.x | mean.y << 8 | mean.z << 16 : color;
+        uvec3 mean = (2u * seen.sums + seen.weight) / max(2u * seen.weight, 1u);
+        color = seen.weight > 0u ? mean.x | mean.y << 8 | mean.z << 16 : color;
     } else if (COLOR_SOURCE == COLOR_PICK) {
         uint target = pixels[2u * pixel_place(uvec2(child.x + 32 >> 6, child.y + 32 >> 6))].x & 0xFFFFFFu;
-        color = seen.count > 0u ? target : color;
+        color = seen.weight > 0u ? target : color;
     }
     return color;
 }
@@ -367,7 +406,7 @@ bool evaluate(Candidate candidate, inout Best best) {
         uint color = found_color(candidate.fly, seen);
         change += scratch_error(color, seen.own_count);
         set_color(candidate.fly, color);
-        if (seen.count == 0u && candidate.paint == PAINT_BIRTH) {
+        if (!seen.is_shown && candidate.paint == PAINT_BIRTH) {
             return false;
         }
     }
@@ -390,13 +429,14 @@ bool has_room(Best best) {
     if (!afford(patch_turns(footprint.box, 0u))) {
         return false;
     }
+    Tile suit = suit_of(best.candidate.fly);
     ivec4 box = footprint.box;
     ivec2 offset = lane_offset();
     int refused = 0;
     for (int y = box.y; y <= box.w; y += PATCH_HEIGHT) {
         for (int x = first_column(box); x <= box.z; x += PATCH_WIDTH) {
             ivec2 pixel = ivec2(x, y) + offset;
-            if (footprint_covers(footprint, pixel)) {
+            if (look_of(footprint, suit, pixel) != LOOK_HOLE) {
                 uint place = pixel_place(uvec2(pixel));
                 if (pixels[2u * place].x >> 24 == STACK_DEPTH) {
                     uint first = place / 64u * 1024u + place % 64u;
@@ -419,7 +459,9 @@ struct Exchange {
     uint color;
     Footprint old;
     Footprint new;
-    // Neither depth nor colour changes.
+    Tile old_suit;
+    Tile new_suit;
+    // Neither depth nor colour changes; of a dressed tile both may, from pixel to pixel.
     bool is_kept;
 };
 
@@ -436,19 +478,19 @@ uint depth_of(uint fly, Exchange change) {
     return fly == change.fly ? change.z : flies[fly].z;
 }
 
-// Takes the fly off a pixel's stack if it was there, and puts it there if it is now. Returns the turns of its loop.
-uint exchange_pixel(Exchange change, uint place, bool was, bool is) {
+// Takes the fly off a pixel's stack if it was there, and puts it there if it is seen there now. Returns the turns of its loop.
+uint exchange_pixel(Exchange change, uint place, uint look) {
     uvec4 top = pixels[2u * place];
     uvec4 under = pixels[2u * place + 1u];
     uint depth = top.x >> 24;
     uint first = place / 64u * 1024u + place % 64u;
-    uvec2 own = uvec2(change.fly, uint(difference(top.x, change.color)));
+    uvec2 own = uvec2(change.fly, uint(look_error(look, change.color, top.x, want_of(top.z))));
     uvec2 ground = uvec2(NO_FLY, under.w);
     uvec2 nearest = ground;
     uvec2 second = ground;
     uint count = 0u;
     uint changed = STACK_DEPTH;
-    bool is_pending = is;
+    bool is_pending = look != LOOK_HOLE;
     uvec2 next = stacks[first];
     for (uint entry = 0u; entry < depth; ++entry) {
         uvec2 current = next;
@@ -484,7 +526,7 @@ uint exchange_pixel(Exchange change, uint place, bool was, bool is) {
     if (changed < 2u) {
         add_fitness(top.y, int(top.w) - int(under.z));
         add_fitness(nearest.x, int(second.y) - int(nearest.y));
-        pixels[2u * place] = uvec4(target, nearest.x, depth_of(nearest.x, change), nearest.y);
+        pixels[2u * place] = uvec4(target, nearest.x, depth_of(nearest.x, change) | top.z - top_z(top.z), nearest.y);
         pixels[2u * place + 1u] = uvec4(second.x, depth_of(second.x, change), second.y, under.w);
     } else {
         pixels[2u * place].x = target;
@@ -511,12 +553,15 @@ void exchange(Exchange change, ivec4 boxes[2]) {
         for (int y = box.y; y <= box.w; y += PATCH_HEIGHT) {
             for (int x = first_column(box); x <= box.z; x += PATCH_WIDTH) {
                 ivec2 pixel = ivec2(x, y) + offset;
-                bool was = footprint_covers(change.old, pixel);
-                bool is = footprint_covers(change.new, pixel);
+                // Boxes that are apart may share a patch.
+                bool is_in_box = all(greaterThanEqual(pixel, box.xy)) && all(lessThanEqual(pixel, box.zw));
+                bool was = is_in_box && look_of(change.old, change.old_suit, pixel) != LOOK_HOLE;
+                uint look = look_of(change.new, change.new_suit, pixel);
+                bool is = is_in_box && look != LOOK_HOLE;
                 uint depth = 0u;
                 if ((was || is) && !(was && is && change.is_kept)) {
                     covered += (is ? 1 : 0) - (was ? 1 : 0);
-                    depth = exchange_pixel(change, pixel_place(uvec2(pixel)), was, is);
+                    depth = exchange_pixel(change, pixel_place(uvec2(pixel)), look);
                 }
                 inner_turns += subgroupMax(depth) + 1u;
             }
@@ -626,9 +671,10 @@ void main() {
             old = flies[changed];
             Fly child = best.candidate.fly;
             uint color = fly_color(child);
-            bool is_kept = old.z == child.z && fly_color(old) == color;
+            bool is_kept = DRESSED == 0u && old.z == child.z && fly_color(old) == color;
             change = Exchange(
-                changed, child.z, color, footprint_of(old, grid.size), footprint_of(child, grid.size), is_kept
+                changed, child.z, color, footprint_of(old, grid.size), footprint_of(child, grid.size), suit_of(old),
+                suit_of(child), is_kept
             );
             exchange_boxes(change, boxes);
             uint most = patch_turns(boxes[0], STACK_DEPTH + 1u) + patch_turns(boxes[1], STACK_DEPTH + 1u);

@@ -1,6 +1,5 @@
 // The state of a cells search on the device, and what decides its steps. Layout: src/gpu/cells_layout.rs.
 
-const uint NO_FLY = 0xFFFFFFFFu;
 // Step of a cell that has nothing to do.
 const uint STEP_DONE = 0xFFFFFFFFu;
 
@@ -58,6 +57,9 @@ struct SearchRules {
     uint mask_first;
     uint mask_count;
     uint depth_gap;
+    // Width of the ring of grout, and its colour.
+    uint grout;
+    uint grout_color;
     uint guide_columns;
     uint guide_rows;
     uint class_count;
@@ -116,8 +118,8 @@ layout(std430, binding = 2) coherent buffer FliesBuffer { Fly flies[]; };
 layout(std430, binding = 3) coherent buffer CellsBuffer { CellRecord cells[]; };
 // Per fly its cell; then members by cell as they came; then members by cell and index.
 layout(std430, binding = 4) coherent buffer DealsBuffer { uint deals[]; };
-// Two words of four for each pixel, in blocks of 8x8: (target and in its highest byte the depth of the stack; the top fly,
-// its z and its error), (the under fly, its z and its error; the error of the background).
+// Two words of four for each pixel, in blocks of 8x8: (target and in its highest byte the depth of the stack; the top fly, its z
+// and what cells_suit.glsl says, its error), (the under fly, its z and its error; the error of the background).
 layout(std430, binding = 5) coherent buffer PixelsBuffer { uvec4 pixels[]; };
 // Sine of 4,096 steps, 1,024 bell-shaped numbers, 2,049 factors of size.
 layout(std430, binding = 6) readonly buffer TablesBuffer { int tables[]; };

@@ -99,6 +99,10 @@ pub struct SearchRules {
     pub mask_count: u32,
     /// Depth gap.
     pub depth_gap: u32,
+    /// Width of the ring of grout in 1/64 px.
+    pub grout: u32,
+    /// Its colour, packed.
+    pub grout_color: u32,
     /// Guide columns.
     pub guide_columns: u32,
     /// Guide rows.

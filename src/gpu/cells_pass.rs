@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::cells_layout::{CellRecord, CellsPush, FlyRecord, SearchHeader, SearchRules};
 use super::cells_state::{PIXEL_WORDS, Plan, STACK_WORDS, rules_record};
+use super::evaluate_pass::create_mask_buffer;
 use super::shaders;
 use crate::error::{Error, Result};
 use crate::model::cells::Course;
@@ -96,6 +97,14 @@ pub(super) struct CellBuffers {
     guide: Arc<Buffer>,
     pub stacks: Arc<Buffer>,
     scratch: Arc<Buffer>,
+    masks: Arc<Buffer>,
+}
+
+/// What the sizes of the buffers depend on, besides the flies.
+#[derive(Clone, Copy)]
+struct Sizes {
+    plan: Plan,
+    scratch_words: u32,
 }
 
 /// Pipelines and buffers of a search.
@@ -126,8 +135,9 @@ impl CellsPass {
         let plan = Plan::new(course);
         let rows = shape.lanes / shape.lanes.min(8);
         let side = plan.cell_side_px;
-        let scratch_words = side.min(plan.block_columns * 8) * (side.min(plan.height_px) + rows);
-        let buffers = CellBuffers::create(device, course, &plan, scratch_words)?;
+        let words = if course.is_plain() { 1 } else { 2 };
+        let scratch_words = words * side.min(plan.block_columns * 8) * (side.min(plan.height_px) + rows);
+        let buffers = CellBuffers::create(device, recorder, course, &Sizes { plan, scratch_words })?;
         buffers.upload(recorder, course, &rules_record(course, &plan, scratch_words))?;
         let whole = |name, module| create_pipeline(device, name, module, &[]);
         let cells = create_pipeline(device, "cells", shaders::CELLS, &specialization(course, shape))?;
@@ -180,7 +190,7 @@ impl CellsPass {
 }
 
 /// The specialisation constants of `glsl/cells.comp`.
-fn specialization(course: &Course, shape: CellShape) -> [(u32, u32); 7] {
+fn specialization(course: &Course, shape: CellShape) -> [(u32, u32); 8] {
     let rules = &course.rules;
     [
         (0, shape.lanes),
@@ -190,6 +200,7 @@ fn specialization(course: &Course, shape: CellShape) -> [(u32, u32); 7] {
         (4, u32::from(rules.births.depth == BirthDepth::Random)),
         (5, u32::from(rules.penalties.turn > 0)),
         (6, u32::from(rules.bounds.local_size != 0)),
+        (7, u32::from(!course.is_plain())),
     ]
 }
 
@@ -205,14 +216,15 @@ fn create_pipeline(
             name,
             spirv: &shaders::words(module),
             specialization,
-            bindings: &[BindingKind::StorageBuffer; 12],
+            bindings: &[BindingKind::StorageBuffer; 13],
             push_constant_bytes: size_of::<CellsPush>() as u32,
         },
     )
 }
 
 impl CellBuffers {
-    fn create(device: &Arc<Device>, course: &Course, plan: &Plan, scratch_words: u32) -> Result<Self> {
+    fn create(device: &Arc<Device>, recorder: &mut Recorder, course: &Course, sizes: &Sizes) -> Result<Self> {
+        let Sizes { plan, scratch_words } = *sizes;
         let (flies, cells) = (course.fly_count, plan.cell_count as usize);
         let storage = |name: &str, bytes: usize| {
             Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
@@ -230,6 +242,7 @@ impl CellBuffers {
             guide: storage("guide", course.guide.samples.len() * 8)?,
             stacks: storage("stacks", plan.pixel_count() * STACK_WORDS * 4)?,
             scratch: storage("shown pixels", cells * scratch_words as usize * 4)?,
+            masks: create_mask_buffer(device, recorder, std::iter::once(&*course.masks))?,
         })
     }
 
@@ -240,8 +253,22 @@ impl CellBuffers {
     }
 
     fn bind(&self, pipeline: &ComputePipeline) -> Result<Arc<BindingGroup>> {
-        let Self { rules, header, flies, cells, deals, pixels, tables, steps, fitness, guide, stacks, scratch } = self;
-        let buffers = [rules, header, flies, cells, deals, pixels, tables, steps, fitness, guide, stacks, scratch];
+        let Self { rules, header, flies, cells, deals, pixels, tables, steps, fitness, guide, stacks, .. } = self;
+        let buffers = [
+            rules,
+            header,
+            flies,
+            cells,
+            deals,
+            pixels,
+            tables,
+            steps,
+            fitness,
+            guide,
+            stacks,
+            &self.scratch,
+            &self.masks,
+        ];
         BindingGroup::create("cells", pipeline.layout(), &buffers.map(Binding::Buffer))
     }
 }

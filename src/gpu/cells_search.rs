@@ -33,6 +33,7 @@ impl VulkanSearch {
     /// # Errors
     /// [`Error::TooLarge`] if its numbers do not fit the device; or if the device fails.
     pub fn new(device: &Arc<Device>, course: Course) -> Result<Self> {
+        cells_state::check(&course)?;
         let shape = CellShape::for_device(device.info(), &course)?;
         Self::with_shape(device, course, shape)
     }

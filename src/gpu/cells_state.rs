@@ -16,6 +16,10 @@ const BLOCK_PIXELS: usize = (BLOCK_SIDE_PX * BLOCK_SIDE_PX) as usize;
 pub(super) const PIXEL_WORDS: usize = 8;
 /// Words of a pixel's stack: a fly and its error for each place.
 pub(super) const STACK_WORDS: usize = 2 * STACK_DEPTH;
+/// The bits of a layer's third word that hold its depth; those above hold a pixel's weight less 1, and whether it wants no tile.
+const DEPTH_MASK: u32 = (1 << WEIGHT_SHIFT) - 1;
+const WEIGHT_SHIFT: u32 = 25;
+const UNWANTED_SHIFT: u32 = 29;
 /// Flies are told by 28 bits in a candidate.
 const FLY_COUNT_MAX: usize = 1 << 28;
 
@@ -150,6 +154,8 @@ pub(super) fn rules_record(course: &Course, plan: &Plan, scratch_words: u32) -> 
         mask_first: rules.mask_first,
         mask_count: rules.mask_count,
         depth_gap: rules.depth_gap,
+        grout: rules.grout,
+        grout_color: rules.grout_color,
         guide_columns: guide.columns,
         guide_rows: guide.rows,
         class_count: rules.class_count,
@@ -204,18 +210,21 @@ impl FlyRecord {
 pub(super) fn pixel_words(course: &Course, plan: &Plan, flies: &[Fly], stacks: &Stacks) -> (Vec<u32>, Vec<u32>) {
     let mut pixels = vec![0; plan.pixel_count() * PIXEL_WORDS];
     let mut words = vec![0; plan.pixel_count() * STACK_WORDS];
-    let rules = &course.rules;
-    for ((place, stack), &color) in plan.places().zip(&stacks.pixels).zip(course.target.pixels()) {
-        let target = pack(color);
-        let ground = difference(target, rules.background) + (rules.penalties.hole + rules.penalties.overlap) as i32;
+    let Course { rules, target, .. } = course;
+    for ((place, stack), number) in plan.places().zip(&stacks.pixels).zip(0..) {
+        let color = pack(target.pixels()[number]);
+        let weight = target.weights().map_or(1, |weights| u32::from(weights[number]));
+        let is_unwanted = target.transparent().is_some_and(|transparent| transparent[number]);
+        let bare = difference(color, rules.background) * weight as i32 + rules.penalties.hole as i32;
+        let ground = if is_unwanted { 0 } else { bare } + rules.penalties.overlap as i32;
         let layer = |nth: usize| {
             stack.get(nth).map_or((NO_FLY, BACKGROUND_Z, ground), |&(fly, error)| (fly, flies[fly as usize].z, error))
         };
         let ((top, top_z, top_error), (under, under_z, under_error)) = (layer(0), layer(1));
         pixels[place * PIXEL_WORDS..(place + 1) * PIXEL_WORDS].copy_from_slice(&[
-            target | (stack.len() as u32) << 24,
+            color | (stack.len() as u32) << 24,
             top,
-            top_z,
+            top_z | (weight - 1) << WEIGHT_SHIFT | u32::from(is_unwanted) << UNWANTED_SHIFT,
             top_error as u32,
             under,
             under_z,
@@ -249,7 +258,7 @@ pub(super) fn set_depths(pixels: &mut [u32], flies: &[FlyRecord]) {
     for pixel in pixels.chunks_exact_mut(PIXEL_WORDS) {
         for layer in [1, 4] {
             if let Some(fly) = flies.get(pixel[layer] as usize) {
-                pixel[layer + 1] = fly.z;
+                pixel[layer + 1] = pixel[layer + 1] & !DEPTH_MASK | fly.z;
             }
         }
     }
