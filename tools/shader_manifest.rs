@@ -13,7 +13,18 @@ use sha2::{Digest, Sha256};
 pub const OPTIONS: &str = "target=vulkan1.3 optimization=none warnings=errors";
 
 /// The shader stages, as named in `glsl/`; the module of `evaluate.comp` is `spirv/evaluate.comp.spv`.
-pub const STAGES: [&str; 5] = ["compose.comp", "evaluate.comp", "mosaic.frag", "mosaic.vert", "translucent.comp"];
+pub const STAGES: [&str; 10] = [
+    "cells.comp",
+    "cells_deal.comp",
+    "cells_scan.comp",
+    "cells_scatter.comp",
+    "cells_sort.comp",
+    "compose.comp",
+    "evaluate.comp",
+    "mosaic.frag",
+    "mosaic.vert",
+    "translucent.comp",
+];
 
 /// `spirv/MANIFEST`.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -2,6 +2,10 @@
 //!
 //! Each pass has a shader of the same stem in `glsl/` and a twin of the same stem in `cpu/`, and gives the same bits.
 
+pub mod cells_layout;
+mod cells_pass;
+mod cells_search;
+mod cells_state;
 mod compose_pass;
 mod evaluate_pass;
 mod evaluator;
@@ -11,5 +15,7 @@ mod re_render;
 mod shaders;
 mod translucent_pass;
 
+pub use cells_pass::{CellForm, CellShape};
+pub use cells_search::VulkanSearch;
 pub use evaluate_pass::KernelShape;
 pub use evaluator::GpuEvaluator;

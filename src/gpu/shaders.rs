@@ -13,6 +13,17 @@ pub(super) const TRANSLUCENT: &[u8] = include_bytes!("../../spirv/translucent.co
 /// Twin: `cpu/mosaic.rs`.
 pub(super) const COMPOSE: &[u8] = include_bytes!("../../spirv/compose.comp.spv");
 
+/// Twin: `cpu/cells/cell.rs`.
+pub(super) const CELLS: &[u8] = include_bytes!("../../spirv/cells.comp.spv");
+/// Twin: `deal` in `cpu/cells/mod.rs`.
+pub(super) const CELLS_DEAL: &[u8] = include_bytes!("../../spirv/cells_deal.comp.spv");
+/// Slices of members for the cells.
+pub(super) const CELLS_SCAN: &[u8] = include_bytes!("../../spirv/cells_scan.comp.spv");
+/// Members into their slices.
+pub(super) const CELLS_SCATTER: &[u8] = include_bytes!("../../spirv/cells_scatter.comp.spv");
+/// Slices in the order of the flies.
+pub(super) const CELLS_SORT: &[u8] = include_bytes!("../../spirv/cells_sort.comp.spv");
+
 /// A module as the words that Vulkan reads; the bytes in the binary may lie at any address.
 pub(super) fn words(module: &[u8]) -> Vec<u32> {
     bytemuck::pod_collect_to_vec(module)

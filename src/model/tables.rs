@@ -47,6 +47,13 @@ pub fn size_factor_q16(step: i32) -> u64 {
     SIZE_FACTOR[(step.clamp(-SIZE_STEPS, SIZE_STEPS) + SIZE_STEPS) as usize]
 }
 
+/// All tables as a device reads them: the sine of every step of a turn, the bell-shaped numbers, the factors of size.
+#[must_use]
+pub fn device_words() -> Vec<i32> {
+    let factors = SIZE_FACTOR.iter().map(|&factor| factor as i32);
+    SINE.iter().chain(NORMAL.iter()).copied().chain(factors).collect()
+}
+
 /// x with P(standard normal < x) = `p`, for 0 < `p` < 1, by bisection of the error function.
 fn inverse_normal(p: f64) -> f64 {
     let (mut low, mut high) = (-8.0, 8.0);

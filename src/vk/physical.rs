@@ -103,7 +103,7 @@ const SUBGROUP_NAMES: [(vk::SubgroupFeatureFlags, &str); 8] = [
 ];
 
 /// Storage buffers that one stage of our largest pipeline sees.
-const STORAGE_BUFFERS: u32 = 10;
+const STORAGE_BUFFERS: u32 = 13;
 
 /// Asks the driver everything that [`DeviceInfo`] holds.
 pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> Result<DeviceInfo> {

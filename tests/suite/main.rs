@@ -6,6 +6,7 @@
 mod bench;
 mod canary;
 mod cells;
+mod cells_vulkan;
 mod cli;
 mod cli_cells;
 mod cli_interrupts;

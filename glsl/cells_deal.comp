@@ -1,0 +1,54 @@
+// Gives every fly its cell in the grid of the round that begins; one invocation is one fly. Twin: `deal` in
+// src/cpu/cells/mod.rs.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+
+#include "shared/cells_random.glsl"
+#include "shared/cells_state.glsl"
+#include "shared/cells_footprint.glsl"
+#include "shared/cells_grid.glsl"
+
+layout(local_size_x = 64) in;
+
+uint first_round(uint fly) {
+    uint count = rules[0].class_count;
+    uint round = rules[0].first_round_3;
+    round = count <= 3u || fly < rules[0].end_2 ? rules[0].first_round_2 : round;
+    round = count <= 2u || fly < rules[0].end_1 ? rules[0].first_round_1 : round;
+    return count <= 1u || fly < rules[0].end_0 ? rules[0].first_round_0 : round;
+}
+
+// The cell of the worst of some random pixels.
+uint deal_absent(Grid grid, uint draws) {
+    int worst = -1;
+    uint cell = 0u;
+    for (uint number = 0u; number < rules[0].deal_tournament; ++number) {
+        uvec2 pixel = uvec2(
+            chain_below(draws, 2u * number, grid.size.x), chain_below(draws, 2u * number + 1u, grid.size.y)
+        );
+        int error = int(pixels[2u * pixel_place(pixel)].w);
+        cell = error > worst ? grid_cell_at(grid, pixel) : cell;
+        worst = max(error, worst);
+    }
+    return cell;
+}
+
+void main() {
+    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    uint round = header[0].round;
+    if (index >= rules[0].fly_count || header[0].pending != 0u || round >= header[0].wanted) {
+        return;
+    }
+    Grid grid = grid_new(search_seed(), round, picture_size(), rules[0].side_shift);
+    Fly fly = flies[index];
+    uint cell = NO_CELL;
+    if (is_alive(fly)) {
+        cell = grid_cell_of(grid, footprint_of(fly, grid.size).box);
+    } else if (first_round(index) <= round) {
+        cell = deal_absent(grid, chain_then(chain_new(search_seed(), round, DRAW_DEAL), index));
+    }
+    deals[index] = cell;
+    if (cell != NO_CELL) {
+        atomicAdd(cells[cell].dealt, 1u);
+    }
+}

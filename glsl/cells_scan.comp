@@ -1,0 +1,57 @@
+// Gives each cell its slice of the members, and begins the round; one workgroup does it all.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+
+#include "shared/cells_random.glsl"
+#include "shared/cells_state.glsl"
+#include "shared/cells_footprint.glsl"
+#include "shared/cells_grid.glsl"
+
+const uint THREADS = 256u;
+
+layout(local_size_x = 256) in;
+
+shared uint counts[THREADS];
+shared uint busy[THREADS];
+
+void main() {
+    uint thread = gl_LocalInvocationID.x;
+    uint round = header[0].round;
+    bool begins = header[0].pending == 0u && round < header[0].wanted;
+    Grid grid = grid_new(search_seed(), round, picture_size(), rules[0].side_shift);
+    uint cell_count = begins ? grid.columns * grid.rows : 0u;
+    // Each invocation takes a run of cells.
+    uint run = (cell_count + THREADS - 1u) / THREADS;
+    uint first_cell = min(thread * run, cell_count);
+    uint end_cell = min(first_cell + run, cell_count);
+    uint count = 0u;
+    uint busy_count = 0u;
+    for (uint cell = first_cell; cell < end_cell; ++cell) {
+        count += cells[cell].dealt;
+        busy_count += cells[cell].dealt > 0u ? 1u : 0u;
+    }
+    counts[thread] = count;
+    busy[thread] = busy_count;
+    memoryBarrierShared();
+    barrier();
+    uint first = 0u;
+    uint total_busy = 0u;
+    for (uint other = 0u; other < THREADS; ++other) {
+        first += other < thread ? counts[other] : 0u;
+        total_busy += busy[other];
+    }
+    for (uint cell = first_cell; cell < end_cell; ++cell) {
+        uint dealt = cells[cell].dealt;
+        cells[cell] = CellRecord(first, dealt, dealt > 0u ? 0u : STEP_DONE, 0u, 0u);
+        first += dealt;
+    }
+    if (thread == 0u) {
+        header[0].iterations += begins || header[0].pending != 0u ? 1u : 0u;
+        header[0].is_fresh = begins ? 1u : 0u;
+        if (begins) {
+            header[0].pending = total_busy;
+            // A round in which no cell has a fly is over at once.
+            header[0].round = total_busy == 0u ? round + 1u : round;
+        }
+    }
+}

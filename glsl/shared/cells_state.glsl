@@ -1,0 +1,153 @@
+// The state of a cells search on the device, and what decides its steps. Layout: src/gpu/cells_layout.rs.
+
+// Step of a cell that has nothing to do.
+const uint STEP_DONE = 0xFFFFFFFFu;
+
+struct Fly {
+    int x;
+    int y;
+    uint z;
+    // Red and green, 16 bits each, red lowest.
+    uint rg;
+    // Blue and angle.
+    uint ba;
+    uint w;
+    uint h;
+    // Mask; bit 16 is set if the fly is not absent.
+    uint form;
+};
+
+struct SearchRules {
+    uint seed_low;
+    uint seed_high;
+    uint width;
+    uint height;
+    // Blocks of 8x8 px in a row.
+    uint columns;
+    // Logarithm of the side of a cell.
+    uint side_shift;
+    uint fly_count;
+    // Words of scratch for each cell.
+    uint scratch_words;
+    uint side;
+    uint candidates;
+    uint steps_per_fly;
+    uint deal_tournament;
+    // Largest change that is accepted.
+    int highest;
+    uint birth_q16;
+    uint recolor_q16;
+    uint edge;
+    uint turn;
+    uint shift;
+    uint depth;
+    uint mix_total;
+    uint place_tournament;
+    uint victim_tournament;
+    int side_low;
+    int side_high;
+    int aspect_high;
+    uint angle_spread;
+    uint coherence_range;
+    uint side_min_q8;
+    uint side_max_q8;
+    uint aspect_max_q8;
+    uint overlap;
+    uint turn_penalty;
+    uint mask_first;
+    uint mask_count;
+    uint depth_gap;
+    // Width of the ring of grout, and its colour.
+    uint grout;
+    uint grout_color;
+    uint guide_columns;
+    uint guide_rows;
+    uint class_count;
+    // End, scale and first round of each class.
+    uint end_0;
+    uint end_1;
+    uint end_2;
+    uint scale_0;
+    uint scale_1;
+    uint scale_2;
+    uint scale_3;
+    uint first_round_0;
+    uint first_round_1;
+    uint first_round_2;
+    uint first_round_3;
+};
+
+struct Header {
+    // Rounds made, and rounds to make.
+    uint round;
+    uint wanted;
+    // Cells that have steps left in this round.
+    uint pending;
+    // 1: the scan of this iteration began a round.
+    uint is_fresh;
+    // Not 0: a step of this cell, less 1, alone exceeds the budget.
+    uint overrun;
+    uint evals_low;
+    uint evals_high;
+    uint births_low;
+    uint births_high;
+    uint accepted_low;
+    uint accepted_high;
+    // Change of the objective since the population was loaded.
+    uint change_low;
+    uint change_high;
+    // Dispatches of cells that had something to do.
+    uint iterations;
+};
+
+struct CellRecord {
+    // Its slice of the members.
+    uint first;
+    uint count;
+    // Steps made, then members looked at for removal; STEP_DONE when there is nothing left.
+    uint step;
+    // Members that the next round deals to the cell.
+    uint dealt;
+    // Members written to the slice.
+    uint filled;
+};
+
+layout(std430, binding = 0) readonly buffer RulesBuffer { SearchRules rules[]; };
+layout(std430, binding = 1) coherent buffer HeaderBuffer { Header header[]; };
+layout(std430, binding = 2) coherent buffer FliesBuffer { Fly flies[]; };
+layout(std430, binding = 3) coherent buffer CellsBuffer { CellRecord cells[]; };
+// Per fly its cell; then members by cell as they came; then members by cell and index.
+layout(std430, binding = 4) coherent buffer DealsBuffer { uint deals[]; };
+// Two words of four for each pixel, in blocks of 8x8: (target and in its highest byte the depth of the stack; the top fly, its z
+// and what cells_suit.glsl says, its error), (the under fly, its z and its error; the error of the background).
+layout(std430, binding = 5) coherent buffer PixelsBuffer { uvec4 pixels[]; };
+// Sine of 4,096 steps, 1,024 bell-shaped numbers, 2,049 factors of size.
+layout(std430, binding = 6) readonly buffer TablesBuffer { int tables[]; };
+
+int sine_at(uint place) {
+    return tables[place];
+}
+
+int normal_at(uint place) {
+    return tables[4096u + place];
+}
+
+uint size_factor_at(int step) {
+    return uint(tables[6144 + clamp(step, -1024, 1024)]);
+}
+
+bool is_alive(Fly fly) {
+    return fly.form >> 16 != 0u;
+}
+
+uint pixel_place(uvec2 pixel) {
+    return ((pixel.y >> 3) * rules[0].columns + (pixel.x >> 3)) * 64u + (pixel.y & 7u) * 8u + (pixel.x & 7u);
+}
+
+uvec2 picture_size() {
+    return uvec2(rules[0].width, rules[0].height);
+}
+
+uvec2 search_seed() {
+    return uvec2(rules[0].seed_low, rules[0].seed_high);
+}

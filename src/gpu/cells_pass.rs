@@ -1,0 +1,274 @@
+//! The compute passes of a cells search: deal, scan, scatter, sort, then the steps of all cells. Twin: `cpu/cells/`.
+
+use std::sync::Arc;
+
+use super::cells_layout::{CellRecord, CellsPush, FlyRecord, SearchHeader, SearchRules};
+use super::cells_state::{PIXEL_WORDS, Plan, STACK_WORDS, rules_record};
+use super::evaluate_pass::create_mask_buffer;
+use super::shaders;
+use crate::error::{Error, Result};
+use crate::model::cells::Course;
+use crate::model::cells::rules::{BirthDepth, BirthKind};
+use crate::model::tables;
+use crate::vk::{
+    Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePass, ComputePipeline, ComputeShader, Device,
+    DeviceInfo, DeviceKind, Recorder, Residence,
+};
+
+/// Invocations of a workgroup of the passes that work fly by fly.
+const FLIES_PER_GROUP: u32 = 64;
+/// Turns of loops that software Vulkan grants an invocation, less a margin. On hardware it bounds a dispatch to some
+/// milliseconds.
+const BUDGET: u32 = 60_000;
+/// Most invocations of a workgroup that is chosen here.
+const LANES_MAX: u32 = 1_024;
+/// Invocations of a workgroup on hardware.
+const LANES_WIDE: u32 = 64;
+
+/// How the invocations of a cell work together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellForm {
+    /// A workgroup is one subgroup, which needs no barrier: best on software Vulkan.
+    Narrow = 0,
+    /// A workgroup may have several subgroups.
+    Wide = 1,
+}
+
+/// How the work of a cell is cut; it never changes a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellShape {
+    /// Invocations of a workgroup, a power of two; in the narrow form those of a subgroup.
+    pub lanes: u32,
+    /// How they work together.
+    pub form: CellForm,
+    /// Most turns of loops in an invocation of one dispatch. Software Vulkan ends all loops of an invocation silently after 65,535
+    /// turns (Mesa 22.3.6, llvmpipe).
+    pub budget: u32,
+}
+
+impl CellShape {
+    /// The shape for a device: the fewest invocations whose longest step fits the budget.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] if the steps of this search are too long for any.
+    pub fn for_device(info: &DeviceInfo, course: &Course) -> Result<Self> {
+        let narrow = Self { lanes: info.subgroup_size, form: CellForm::Narrow, budget: BUDGET };
+        let wide = |lanes| Self { lanes, form: CellForm::Wide, budget: BUDGET };
+        let most = LANES_MAX.min(info.limits.workgroup_invocations);
+        let first = if info.kind == DeviceKind::Cpu { Some(narrow) } else { None };
+        let lanes = (LANES_WIDE.ilog2()..=most.ilog2()).map(|power| 1 << power);
+        let mut shapes = first.into_iter().chain(lanes.map(wide));
+        shapes.find(|shape| shape.longest_step(course) <= u64::from(BUDGET)).ok_or_else(|| {
+            Error::TooLarge(format!(
+                "one step of {} candidates with tiles this large is too long for a dispatch of the Vulkan device; use more --tiles, fewer --candidates, or --device cpu",
+                course.rules.candidates
+            ))
+        })
+    }
+
+    /// Most turns of loops that one step may take; counted as `glsl/cells.comp` does.
+    fn longest_step(self, course: &Course) -> u64 {
+        let (width, height) = Plan::new(course).largest_box(&course.rules);
+        let columns = self.lanes.min(8);
+        let rows = self.lanes / columns;
+        // A box begins anywhere in a patch.
+        let (across, down) = (u64::from(width.div_ceil(columns) + 1), u64::from(height.div_ceil(rows)));
+        let turns = |inner: u64| 3 + 3 * down + across * down * (1 + inner);
+        let rules = &course.rules;
+        let tournaments = u64::from(rules.births.place_tournament + rules.births.victim_tournament);
+        let batches = u64::from(rules.candidates.div_ceil(self.lanes.min(64)));
+        let candidate = 8 + turns(0) + 20 + 9 * across * down;
+        let making = 2 * 40 + batches * (12 + tournaments);
+        making + u64::from(rules.candidates) * candidate + turns(0) + 2 * turns(17)
+    }
+}
+
+/// The buffers of a search, in the order of their bindings.
+pub(super) struct CellBuffers {
+    pub rules: Arc<Buffer>,
+    pub header: Arc<Buffer>,
+    pub flies: Arc<Buffer>,
+    pub cells: Arc<Buffer>,
+    deals: Arc<Buffer>,
+    pub pixels: Arc<Buffer>,
+    tables: Arc<Buffer>,
+    pub steps: Arc<Buffer>,
+    pub fitness: Arc<Buffer>,
+    guide: Arc<Buffer>,
+    pub stacks: Arc<Buffer>,
+    scratch: Arc<Buffer>,
+    masks: Arc<Buffer>,
+}
+
+/// What the sizes of the buffers depend on, besides the flies.
+#[derive(Clone, Copy)]
+struct Sizes {
+    plan: Plan,
+    scratch_words: u32,
+}
+
+/// Pipelines and buffers of a search.
+pub(super) struct CellsPass {
+    pub buffers: CellBuffers,
+    budget: u32,
+    fly_groups: u32,
+    cell_count: u32,
+    workgroups_per_row: u32,
+    deal: Arc<ComputePipeline>,
+    scan: Arc<ComputePipeline>,
+    scatter: Arc<ComputePipeline>,
+    sort: Arc<ComputePipeline>,
+    cells: Arc<ComputePipeline>,
+    group: Arc<BindingGroup>,
+}
+
+impl CellsPass {
+    /// Creates pipelines and buffers, and uploads what never changes: rules, tables and the guide.
+    pub fn create(device: &Arc<Device>, recorder: &mut Recorder, course: &Course, shape: CellShape) -> Result<Self> {
+        let info = device.info();
+        if shape.form == CellForm::Narrow && shape.lanes != info.subgroup_size {
+            return Err(Error::Usage(format!(
+                "a narrow workgroup has the {} invocations of a subgroup, not {}",
+                info.subgroup_size, shape.lanes
+            )));
+        }
+        let plan = Plan::new(course);
+        let rows = shape.lanes / shape.lanes.min(8);
+        let side = plan.cell_side_px;
+        let words = if course.is_plain() { 1 } else { 2 };
+        let scratch_words = words * side.min(plan.block_columns * 8) * (side.min(plan.height_px) + rows);
+        let buffers = CellBuffers::create(device, recorder, course, &Sizes { plan, scratch_words })?;
+        buffers.upload(recorder, course, &rules_record(course, &plan, scratch_words))?;
+        let whole = |name, module| create_pipeline(device, name, module, &[]);
+        let cells = create_pipeline(device, "cells", shaders::CELLS, &specialization(course, shape))?;
+        let group = buffers.bind(&cells)?;
+        Ok(Self {
+            buffers,
+            budget: shape.budget,
+            fly_groups: (course.fly_count as u32).div_ceil(FLIES_PER_GROUP).max(1),
+            cell_count: plan.cell_count,
+            workgroups_per_row: info.limits.workgroups[0],
+            deal: whole("cells_deal", shaders::CELLS_DEAL)?,
+            scan: whole("cells_scan", shaders::CELLS_SCAN)?,
+            scatter: whole("cells_scatter", shaders::CELLS_SCATTER)?,
+            sort: whole("cells_sort", shaders::CELLS_SORT)?,
+            cells,
+            group,
+        })
+    }
+
+    /// Records so many iterations: each begins a round unless one is under way, and takes each cell as far as the budget allows.
+    pub fn record(&self, recorder: &mut Recorder, iterations: u32) -> Result<()> {
+        let push = CellsPush { budget: self.budget };
+        let mut pass = recorder.compute_pass("cells")?;
+        for _ in 0..iterations {
+            for (pipeline, count) in [
+                (&self.deal, self.fly_groups),
+                (&self.scan, 1),
+                (&self.scatter, self.fly_groups),
+                (&self.sort, self.fly_groups),
+                (&self.cells, self.cell_count),
+            ] {
+                pass.bind(pipeline, &self.group);
+                pass.push_constants(bytemuck::bytes_of(&push));
+                self.dispatch(&mut pass, count);
+                pass.barrier();
+            }
+        }
+        Ok(())
+    }
+
+    /// Most turns of loops in an invocation of one dispatch.
+    pub fn budget(&self) -> u32 {
+        self.budget
+    }
+
+    fn dispatch(&self, pass: &mut ComputePass<'_>, count: u32) {
+        let columns = count.min(self.workgroups_per_row);
+        pass.dispatch(columns, count.div_ceil(columns), 1);
+    }
+}
+
+/// The specialisation constants of `glsl/cells.comp`.
+fn specialization(course: &Course, shape: CellShape) -> [(u32, u32); 8] {
+    let rules = &course.rules;
+    [
+        (0, shape.lanes),
+        (1, shape.form as u32),
+        (2, rules.color as u32),
+        (3, u32::from(rules.births.kind == BirthKind::Mutant)),
+        (4, u32::from(rules.births.depth == BirthDepth::Random)),
+        (5, u32::from(rules.penalties.turn > 0)),
+        (6, u32::from(rules.bounds.local_size != 0)),
+        (7, u32::from(!course.is_plain())),
+    ]
+}
+
+fn create_pipeline(
+    device: &Arc<Device>,
+    name: &str,
+    module: &[u8],
+    specialization: &[(u32, u32)],
+) -> Result<Arc<ComputePipeline>> {
+    ComputePipeline::create(
+        device,
+        &ComputeShader {
+            name,
+            spirv: &shaders::words(module),
+            specialization,
+            bindings: &[BindingKind::StorageBuffer; 13],
+            push_constant_bytes: size_of::<CellsPush>() as u32,
+        },
+    )
+}
+
+impl CellBuffers {
+    fn create(device: &Arc<Device>, recorder: &mut Recorder, course: &Course, sizes: &Sizes) -> Result<Self> {
+        let Sizes { plan, scratch_words } = *sizes;
+        let (flies, cells) = (course.fly_count, plan.cell_count as usize);
+        let storage = |name: &str, bytes: usize| {
+            Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
+        };
+        Ok(Self {
+            rules: storage("search rules", size_of::<SearchRules>())?,
+            header: storage("search header", size_of::<SearchHeader>())?,
+            flies: storage("flies", flies * size_of::<FlyRecord>())?,
+            cells: storage("cells", cells * size_of::<CellRecord>())?,
+            deals: storage("deals", flies * 12)?,
+            pixels: storage("pixels", plan.pixel_count() * PIXEL_WORDS * 4)?,
+            tables: storage("tables", tables::device_words().len() * 4)?,
+            steps: storage("steps", flies * 4)?,
+            fitness: storage("marginal fitness", flies * 4)?,
+            guide: storage("guide", course.guide.samples.len() * 8)?,
+            stacks: storage("stacks", plan.pixel_count() * STACK_WORDS * 4)?,
+            scratch: storage("shown pixels", cells * scratch_words as usize * 4)?,
+            masks: create_mask_buffer(device, recorder, std::iter::once(&*course.masks))?,
+        })
+    }
+
+    fn upload(&self, recorder: &mut Recorder, course: &Course, rules: &SearchRules) -> Result<()> {
+        recorder.write_buffer(&self.rules, 0, bytemuck::bytes_of(rules))?;
+        recorder.write_buffer(&self.tables, 0, bytemuck::cast_slice(&tables::device_words()))?;
+        recorder.write_buffer(&self.guide, 0, bytemuck::cast_slice(&course.guide.samples))
+    }
+
+    fn bind(&self, pipeline: &ComputePipeline) -> Result<Arc<BindingGroup>> {
+        let Self { rules, header, flies, cells, deals, pixels, tables, steps, fitness, guide, stacks, .. } = self;
+        let buffers = [
+            rules,
+            header,
+            flies,
+            cells,
+            deals,
+            pixels,
+            tables,
+            steps,
+            fitness,
+            guide,
+            stacks,
+            &self.scratch,
+            &self.masks,
+        ];
+        BindingGroup::create("cells", pipeline.layout(), &buffers.map(Binding::Buffer))
+    }
+}
