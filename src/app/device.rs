@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::cpu::CpuEvaluator;
 use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
-use crate::gpu::GpuEvaluator;
+use crate::gpu::{GpuEvaluator, VulkanSearch};
 use crate::model::cells::{Course, Search};
 use crate::model::{Evaluator, Fly, Scene};
 use crate::vk::{
@@ -159,13 +159,13 @@ impl Selected {
     /// A search in cells on this device, which begins with absent flies.
     ///
     /// # Errors
-    /// [`Error::NoSuitableDevice`] if the device cannot search.
+    /// If the device has no room for the search, or its tiles are too large for it.
     pub(super) fn open_search(&self, course: Course) -> Result<OpenedSearch> {
         match self {
             Self::Cpu { .. } => Ok(OpenedSearch { search: Box::new(CpuSearch::new(course)), validation_log: None }),
-            Self::Vulkan { device, .. } => {
-                let why = format!("{} cannot search in cells; use --device cpu or --scheme paper", device.info().name);
-                Err(Error::NoSuitableDevice { why })
+            Self::Vulkan { device, validation_log } => {
+                let search = Box::new(VulkanSearch::new(device, course)?);
+                Ok(OpenedSearch { search, validation_log: Some(Arc::clone(validation_log)) })
             }
         }
     }
