@@ -6,6 +6,7 @@
 
 pub mod color;
 pub mod footprint;
+pub mod glaze;
 pub mod grid;
 pub mod operators;
 pub mod pixel;
