@@ -4,7 +4,7 @@
 //! of tiles. All numbers are integers: they decide the picture.
 
 use crate::model::cells::Rules;
-use crate::model::cells::rules::{ASPECT_FREE_Q8, Births, Bounds, CLASSES_MAX, Class, ONE_Q16, Penalties};
+use crate::model::cells::rules::{ASPECT_FREE_Q8, Births, Bounds, CLASSES_MAX, Class, Mix, ONE_Q16, Penalties};
 use crate::model::tables::size_factor_q16;
 use crate::model::tile::pack;
 use crate::model::{Blend, Rgb};
@@ -74,8 +74,8 @@ pub struct Style {
     pub blend: Blend,
     /// Opacity of whole translucent tiles, 1 to 255.
     pub opacity: u8,
-    /// Steps in each cell and round for each of its flies.
-    pub steps_per_fly: u32,
+    /// Chance that a changed fly is recoloured too, over 65,536.
+    pub recolor_q16: u32,
 }
 
 impl Style {
@@ -115,7 +115,7 @@ impl Style {
             shader: "template".to_owned(),
             blend: Blend::Opaque,
             opacity: 255,
-            steps_per_fly: 4,
+            recolor_q16: ONE_Q16 / 5,
         }
     }
 
@@ -170,13 +170,12 @@ impl Style {
             side_max_q8: ONE_Q8 * 8,
             aspect_max_q8: ONE_Q8 * 3,
             birth_min_q8: ONE_Q8,
-            birth_max_q8: ONE_Q8 * 4,
+            birth_max_q8: ONE_Q8 * 6,
+            recolor_q16: ONE_Q16 * 6 / 10,
             masks: vec!["disc".to_owned()],
             shader: "soft".to_owned(),
             blend: Blend::Translucent,
-            opacity: 180,
-            // Marginal fitness is brought up to date once in a round.
-            steps_per_fly: 12,
+            opacity: 200,
             ..Self::free()
         }
     }
@@ -209,7 +208,7 @@ impl Style {
                 local_size: u32::from(matches!(self.guide, GuideKind::Flow { .. })),
             },
             penalties: Penalties { overlap: self.overlap, hole: self.hole, turn: self.turn },
-            steps_per_fly: self.steps_per_fly,
+            mix: Mix { recolor_q16: self.recolor_q16, ..base.mix },
             classes,
             class_count: self.classes.len().clamp(1, CLASSES_MAX) as u32,
             grout: (base.side * self.grout_q8) >> 8,

@@ -218,6 +218,7 @@ impl Glazed {
     }
 
     /// Computes the errors of a row anew.
+    #[inline(always)]
     pub fn refresh_errors(&mut self, row: usize, background: u32) {
         let mut open = Open::START;
         for layer in &self.layers[..self.height(row)] {

@@ -82,9 +82,7 @@ fn worn(swap: &Swap<'_>, (x, y): (i32, i32), bits: u32) -> (Lanes, Lanes) {
     let footprint = swap.new.footprint;
     let (u, v) = footprint.coordinates(x, y);
     for lane in 0..SIDE {
-        let by = |step: i32| step.wrapping_mul(lane as i32);
-        let (u, v) = (u.wrapping_add(by(footprint.cos)), v.wrapping_sub(by(footprint.sin)));
-        let texel = suit.texel(u as u32, v as u32);
+        let texel = suit.texel_at(footprint, (u, v), lane as i32);
         let mask = 0_u32.wrapping_sub(bits >> lane & 1);
         opacities[lane] = opacity(u32::from(texel.coverage)) & mask;
         shades[lane] = u32::from(texel.shade);

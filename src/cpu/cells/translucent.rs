@@ -119,20 +119,23 @@ impl Ground for Glazed {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
 fn exchange(area: &mut Area<'_, Glazed>, swap: &Swap<'_>, background: u32) {
     let color = pack(swap.new.fly.color());
-    let covers = [swap.old, swap.new].map(|piece| Cover { footprint: piece.footprint, suit: piece.suit });
+    let covers = [swap.old, swap.new].map(|piece| Cover { footprint: piece.footprint, suit: None });
     area.exchange_rows(&covers[0], &covers[1], |block, (column, y), [was, is]| {
         if was | is == 0 {
             return;
         }
         let row = (y & 7) as usize;
+        let (u, v) = swap.new.footprint.coordinates(column * 8, y);
         for lane in 0..SIDE {
             let pixel = row * SIDE + lane;
             if was >> lane & 1 != 0 {
                 block.remove(pixel, swap.index);
             }
             let Some(suit) = swap.new.suit.filter(|_| is >> lane & 1 != 0) else { continue };
-            let (u, v) = swap.new.footprint.coordinates(column * 8 + lane as i32, y);
-            block.insert(pixel, (swap.new.fly.z, swap.index), look(suit.texel(u as u32, v as u32), color));
+            let texel = suit.texel_at(swap.new.footprint, (u, v), lane as i32);
+            if texel.coverage > 0 {
+                block.insert(pixel, (swap.new.fly.z, swap.index), look(texel, color));
+            }
         }
         block.refresh_errors(row, background);
     });

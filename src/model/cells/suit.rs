@@ -69,6 +69,14 @@ impl<'a> Suit<'a> {
         texels[row.wrapping_mul(MASK_SIDE as u32).wrapping_add(column) as usize % TEXELS]
     }
 
+    /// Its texel so many pixels to the right of tile coordinates.
+    #[inline(always)]
+    #[must_use]
+    pub fn texel_at(&self, footprint: &Footprint, (u, v): (i32, i32), right_px: i32) -> Texel {
+        let by = |step: i32| step.wrapping_mul(right_px);
+        self.texel(u.wrapping_add(by(footprint.cos)) as u32, v.wrapping_sub(by(footprint.sin)) as u32)
+    }
+
     /// What the tile shows at tile coordinates inside its rectangle; none in a hole of its mask.
     #[inline(always)]
     #[must_use]
