@@ -3,11 +3,11 @@
 //! Lengths are multiples of d, the mean side of a tile (paper Eq. 1), so that a style looks alike at every size and number
 //! of tiles. All numbers are integers: they decide the picture.
 
-use crate::model::Rgb;
 use crate::model::cells::Rules;
 use crate::model::cells::rules::{ASPECT_FREE_Q8, Births, Bounds, CLASSES_MAX, Class, Mix, ONE_Q16, Penalties};
 use crate::model::tables::size_factor_q16;
 use crate::model::tile::pack;
+use crate::model::{Blend, Rgb};
 
 /// Fixed-point one of lengths over d.
 const ONE_Q8: u32 = 256;
@@ -83,6 +83,14 @@ pub struct Style {
     pub classes: Vec<ClassStyle>,
     /// Names of the masks that tiles wear unless others are asked for; none is the square.
     pub masks: Vec<String>,
+    /// Name of the shader that makes masks of their drawings.
+    pub shader: String,
+    /// How the masks' coverage is read.
+    pub blend: Blend,
+    /// Opacity of whole translucent tiles, 1 to 255.
+    pub opacity: u8,
+    /// Chance that a changed fly is recoloured too, over 65,536.
+    pub recolor_q16: u32,
 }
 
 impl Style {
@@ -96,6 +104,7 @@ impl Style {
             "free" => Self::free(),
             "mosaic" => Self::mosaic(),
             "paint" => Self::paint(),
+            "spray" => Self::spray(),
             _ => return None,
         })
     }
@@ -120,6 +129,10 @@ impl Style {
             grout_q8: 0,
             classes: vec![ClassStyle { share_q16: ONE_Q16, scale_q8: ONE_Q8, first_round: 0 }],
             masks: Vec::new(),
+            shader: "template".to_owned(),
+            blend: Blend::Opaque,
+            opacity: 255,
+            recolor_q16: ONE_Q16 / 5,
         }
     }
 
@@ -169,6 +182,24 @@ impl Style {
         }
     }
 
+    /// Soft round clouds of paint that show through each other, as from an airbrush.
+    #[must_use]
+    pub fn spray() -> Self {
+        Self {
+            side_min_q8: ONE_Q8,
+            side_max_q8: ONE_Q8 * 8,
+            aspect_max_q8: ONE_Q8 * 3,
+            birth_min_q8: ONE_Q8,
+            birth_max_q8: ONE_Q8 * 6,
+            recolor_q16: ONE_Q16 * 6 / 10,
+            masks: vec!["disc".to_owned()],
+            shader: "soft".to_owned(),
+            blend: Blend::Translucent,
+            opacity: 200,
+            ..Self::free()
+        }
+    }
+
     /// The rules of the style for `fly_count` tiles of the mean side `side` (1/64 px) over `background`, with grout of
     /// `grout_color`.
     #[must_use]
@@ -198,7 +229,7 @@ impl Style {
                 local_size: u32::from(matches!(self.guide, GuideKind::Flow { .. })),
             },
             penalties: Penalties { overlap: self.overlap, hole: self.hole, turn: self.turn },
-            mix: Mix { ..base.mix },
+            mix: Mix { recolor_q16: self.recolor_q16, ..base.mix },
             classes,
             class_count: self.classes.len().clamp(1, CLASSES_MAX) as u32,
             grout: (base.side * self.grout_q8) >> 8,

@@ -33,6 +33,7 @@ mod shapes;
 mod snapshots;
 mod spirv;
 mod timelapse;
+mod translucent_search;
 mod transparency;
 mod vulkan;
 mod vulkan_failures;

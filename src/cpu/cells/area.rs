@@ -3,7 +3,8 @@
 use multiversion::multiversion;
 
 pub(super) use super::block::SIDE;
-use super::block::{Block, PIXELS};
+use super::block::{Block, PIXELS, Plane};
+use super::ground::Ground;
 use crate::model::cells::color::median;
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::pixel::INSIDE;
@@ -13,8 +14,8 @@ use crate::model::cells::suit::Suit;
 pub type Lanes = [i32; SIDE];
 
 /// The blocks of a cell, row by row.
-pub struct Area<'a> {
-    blocks: Vec<&'a mut Block>,
+pub struct Area<'a, B> {
+    blocks: Vec<&'a mut B>,
     /// Blocks along the width.
     columns: usize,
     /// First column and row of blocks in the picture.
@@ -58,9 +59,9 @@ pub(super) struct Rows {
     pub v: i32,
 }
 
-impl<'a> Area<'a> {
+impl<'a, B: Ground> Area<'a, B> {
     /// The blocks of a cell whose first block is `first` in the picture.
-    pub fn new(blocks: Vec<&'a mut Block>, columns: usize, first: (i32, i32)) -> Self {
+    pub fn new(blocks: Vec<&'a mut B>, columns: usize, first: (i32, i32)) -> Self {
         Self { blocks, columns, first }
     }
 
@@ -73,13 +74,13 @@ impl<'a> Area<'a> {
 
     /// A block by its place.
     #[inline(always)]
-    pub fn block(&self, place: usize) -> &Block {
+    pub fn block(&self, place: usize) -> &B {
         self.blocks[place]
     }
 
     /// Calls `visit` for the rows of each block that the box touches.
     #[inline(always)]
-    pub(super) fn visit(&self, footprint: &Footprint, mut visit: impl FnMut(&Block, &Rows)) {
+    pub(super) fn visit(&self, footprint: &Footprint, mut visit: impl FnMut(&B, &Rows)) {
         let (first_x, first_y) = (footprint.x0 >> 3, footprint.y0 >> 3);
         for row in first_y..=footprint.y1 >> 3 {
             let top = (row * 8).max(footprint.y0);
@@ -97,32 +98,54 @@ impl<'a> Area<'a> {
     /// Whether some pixel's stack in the blocks of the box is full.
     pub fn is_full(&self, footprint: &Footprint) -> bool {
         let mut is_full = false;
-        self.visit(footprint, |block, _| is_full |= block.full > 0);
+        self.visit(footprint, |block, _| is_full |= block.full() > 0);
         is_full
     }
 
     /// Calls `visit` for every pixel that one of two tiles covers, with its block, its place in it and in the picture, and whether each
     /// of the two covers it.
     #[inline(always)]
-    pub fn exchange(&mut self, one: &Cover<'_>, other: &Cover<'_>, mut visit: impl FnMut(&mut Block, &Exchanged)) {
+    pub fn exchange(&mut self, one: &Cover<'_>, other: &Cover<'_>, mut visit: impl FnMut(&mut B, &Exchanged)) {
+        self.exchange_rows(one, other, |block, (column, y), rows| {
+            let mut bits = rows[0] | rows[1];
+            while bits != 0 {
+                let lane = bits.trailing_zeros();
+                let [was, is] = rows.map(|row| row >> lane & 1 != 0);
+                let (pixel, x) = ((y & 7) as usize * SIDE + lane as usize, column * 8 + lane as i32);
+                visit(block, &Exchanged { pixel, x, y, was, is });
+                bits &= bits - 1;
+            }
+        });
+    }
+
+    /// Calls `visit` for every row of a block in the boxes of two tiles, with the block's column and the row in the picture, and which
+    /// of its eight pixels each of the two covers, as bits.
+    #[inline(always)]
+    pub fn exchange_rows(
+        &mut self,
+        one: &Cover<'_>,
+        other: &Cover<'_>,
+        mut visit: impl FnMut(&mut B, (i32, i32), [u32; 2]),
+    ) {
         let (a, b) = (one.footprint, other.footprint);
-        let is_apart = a.x1 < b.x0 || b.x1 < a.x0 || a.y1 < b.y0 || b.y1 < a.y0;
+        // Apart by columns of blocks, so that no row is visited twice.
+        let is_apart = a.x1 >> 3 < b.x0 >> 3 || b.x1 >> 3 < a.x0 >> 3 || a.y1 < b.y0 || b.y1 < a.y0;
         if a.is_empty() || b.is_empty() || is_apart {
-            self.exchange_in(a, (one, &Cover::NONE), &mut visit);
-            self.exchange_in(b, (&Cover::NONE, other), &mut visit);
+            self.exchange_rows_in(a, (one, &Cover::NONE), &mut visit);
+            self.exchange_rows_in(b, (&Cover::NONE, other), &mut visit);
         } else {
             let boxed =
                 Footprint { x0: a.x0.min(b.x0), y0: a.y0.min(b.y0), x1: a.x1.max(b.x1), y1: a.y1.max(b.y1), ..*a };
-            self.exchange_in(&boxed, (one, other), &mut visit);
+            self.exchange_rows_in(&boxed, (one, other), &mut visit);
         }
     }
 
     #[inline(always)]
-    fn exchange_in(
+    fn exchange_rows_in(
         &mut self,
         boxed: &Footprint,
         (one, other): (&Cover<'_>, &Cover<'_>),
-        visit: &mut impl FnMut(&mut Block, &Exchanged),
+        visit: &mut impl FnMut(&mut B, (i32, i32), [u32; 2]),
     ) {
         if boxed.is_empty() {
             return;
@@ -134,15 +157,9 @@ impl<'a> Area<'a> {
             for column in columns.clone() {
                 let block = &mut *self.blocks[start + (column - self.first.0) as usize];
                 for y in top..=bottom {
-                    let rows = [one.row_bits(block, (column, y)), other.row_bits(block, (column, y))];
-                    let mut bits = rows[0] | rows[1];
-                    while bits != 0 {
-                        let lane = bits.trailing_zeros();
-                        let [was, is] = rows.map(|row| row >> lane & 1 != 0);
-                        let (pixel, x) = ((y & 7) as usize * SIDE + lane as usize, column * 8 + lane as i32);
-                        visit(block, &Exchanged { pixel, x, y, was, is });
-                        bits &= bits - 1;
-                    }
+                    let target = block.target();
+                    let rows = [one.row_bits(target, (column, y)), other.row_bits(target, (column, y))];
+                    visit(block, (column, y), rows);
                 }
             }
         }
@@ -179,14 +196,14 @@ impl Cover<'_> {
 
     /// Which of the eight pixels of a block's row the tile covers, as bits.
     #[inline(always)]
-    fn row_bits(&self, block: &Block, (column, y): (i32, i32)) -> u32 {
+    fn row_bits(&self, target: &Plane<u32>, (column, y): (i32, i32)) -> u32 {
         let f = self.footprint;
         if column < f.x0 >> 3 || column > f.x1 >> 3 || y < f.y0 || y > f.y1 {
             return 0;
         }
         let (u, v) = f.coordinates(column * 8, y);
         let out = outside(u, v, f);
-        let target = row_of(&block.target, (y & 7) as usize);
+        let target = row_of(target, (y & 7) as usize);
         let mut bits = 0;
         for lane in 0..SIDE {
             bits |= u32::from((out[lane] >= 0) & (target[lane] & INSIDE != 0)) << lane;
@@ -215,7 +232,7 @@ fn outside(u: i32, v: i32, f: &Footprint) -> Lanes {
 
 /// The eight values of a row.
 #[inline(always)]
-fn row_of<T: Copy>(plane: &[T; PIXELS], row: usize) -> &[T; SIDE] {
+pub(super) fn row_of<T: Copy>(plane: &[T; PIXELS], row: usize) -> &[T; SIDE] {
     plane[row * SIDE..row * SIDE + SIDE].first_chunk().expect("a row has eight pixels")
 }
 
@@ -247,7 +264,7 @@ pub(super) fn compare(block: &Block, row: usize, (u, v): (i32, i32), child: &Chi
 
 /// The change of the objective when a child of this colour comes where its victim has gone, without the victim's part.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
-pub fn change(area: &Area<'_>, child: &Child<'_>, color: u32) -> i64 {
+pub fn change(area: &Area<'_, Block>, child: &Child<'_>, color: u32) -> i64 {
     let mut sums = [0_i32; SIDE];
     let f = *child.footprint;
     area.visit(child.footprint, |block, rows| {
@@ -269,7 +286,7 @@ pub fn change(area: &Area<'_>, child: &Child<'_>, color: u32) -> i64 {
 
 impl Shown {
     /// Collects the pixels where a child would show.
-    pub fn collect(&mut self, area: &Area<'_>, child: &Child<'_>) {
+    pub fn collect(&mut self, area: &Area<'_, Block>, child: &Child<'_>) {
         collect(self, area, child);
     }
 
@@ -299,7 +316,7 @@ impl Shown {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
-fn collect(shown: &mut Shown, area: &Area<'_>, child: &Child<'_>) {
+fn collect(shown: &mut Shown, area: &Area<'_, Block>, child: &Child<'_>) {
     let boxed = child.footprint;
     let room = ((boxed.x1 - boxed.x0 + 1) * (boxed.y1 - boxed.y0 + 1)) as usize + SIDE;
     if shown.targets.len() < room {

@@ -2,13 +2,10 @@
 
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
-use super::area::{self, Area, Child, Cover, Exchanged, Shown};
-use super::dressed::{self, DressedShown};
-use super::exchange::{Exchange, add, exchange};
-use crate::model::cells::color::mean;
+use super::area::{Area, Cover, Exchanged};
+use super::ground::{Ground, Paint, Piece, Swap};
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::operators::{self, Setting, slot};
-use crate::model::cells::pixel::STACK_DEPTH;
 use crate::model::cells::random::{Chain, below};
 use crate::model::cells::rules::{Acceptance, BirthKind, ColorSource, STEP_FIRST, grown, shrunk};
 use crate::model::cells::suit::Suit;
@@ -26,6 +23,8 @@ pub struct Shared<'a> {
     pub fitness: &'a [AtomicI64],
     /// Depths; frozen ones do not change.
     pub depths: &'a [AtomicU32],
+    /// Whether no tile is dressed and all pixels count the same.
+    pub is_plain: bool,
 }
 
 /// A fly of the cell.
@@ -59,19 +58,16 @@ struct Candidate {
 }
 
 /// One cell at work.
-pub struct Cell<'a> {
+pub struct Cell<'a, G: Ground> {
     pub shared: &'a Shared<'a>,
     pub number: u32,
-    pub area: Area<'a>,
+    pub area: Area<'a, G>,
     pub members: Vec<Member>,
-    /// Whether no tile is dressed and all pixels count the same.
-    pub is_plain: bool,
-    pub shown: Shown,
-    pub dressed: DressedShown,
+    pub desk: G::Desk,
     pub done: Done,
 }
 
-impl<'a> Cell<'a> {
+impl<'a, G: Ground> Cell<'a, G> {
     /// Makes all steps of the round, then removes the flies that do not help.
     pub fn run(&mut self, chain: Chain) {
         let steps = self.members.len() as u32 * self.shared.course.rules.steps_per_fly;
@@ -227,9 +223,9 @@ impl<'a> Cell<'a> {
             let bits = draws.bits(slot::PLACE + number);
             let (x, y) = (x0 + below(bits << 16, x1 - x0), y0 + below(bits & 0xFFFF_0000, y1 - y0));
             let (block, pixel) = self.area.place(x as i32, y as i32);
-            let top = &self.area.block(block).top;
-            if top.error[pixel] > worst.0 {
-                worst = (top.error[pixel], (x, y, top.z[pixel] as u32));
+            let (error, z) = self.area.block(block).seen(pixel);
+            if error > worst.0 {
+                worst = (error, (x, y, z));
             }
         }
         worst.1
@@ -248,54 +244,26 @@ impl<'a> Cell<'a> {
         if shared.grid.cell_of(&footprint) != self.number {
             return None;
         }
-        let seen =
-            Child { footprint: &footprint, z: child.z as i32, fly: index, overlap: rules.penalties.overlap as i32 };
-        let own =
-            shared.fitness[index as usize].load(Ordering::Relaxed) + operators::turn_penalty(&child, rules, local);
-        let (child, change) = self.painted(&child, &seen, paint)?;
+        let old_footprint = self.footprint(&old);
+        let suits = [self.suit(&old), self.suit(&child)];
+        let swap = Swap {
+            index,
+            old: Piece { fly: &old, footprint: &old_footprint, suit: suits[0].as_ref() },
+            new: Piece { fly: &child, footprint: &footprint, suit: suits[1].as_ref() },
+        };
+        let own = G::without_victim(self.fitness(victim), turn_penalty(shared.course, &old))
+            + operators::turn_penalty(&child, rules, local);
+        let picked = if rules.color == ColorSource::Pick { self.picked(&child) } else { 0 };
+        let (color, change) = G::painted(&mut self.area, &mut self.desk, shared, &swap, (paint, picked))?;
+        let child = if color == pack(child.color()) { child } else { child.with_color(unpack(color)) };
         if child == old {
             return None;
         }
         Some(Candidate { victim, fly: child, footprint, is_birth: paint == Paint::Birth, change: own + change })
     }
 
-    /// The child with its colour, and the change that it would make to its pixels; none for a birth that would show nowhere.
-    fn painted(&mut self, child: &Fly, seen: &Child<'_>, paint: Paint) -> Option<(Fly, i64)> {
-        let source = self.shared.course.rules.color;
-        let has_new_color = paint != Paint::Keep && source != ColorSource::Evolved;
-        let old_color = pack(child.color());
-        let suit = self.suit(child);
-        let Some(suit) = &suit else {
-            if !has_new_color {
-                return Some((*child, area::change(&self.area, seen, old_color)));
-            }
-            self.shown.collect(&self.area, seen);
-            let count = self.shown.count() as u32;
-            if count == 0 && paint == Paint::Birth {
-                return None;
-            }
-            let color = match source {
-                _ if count == 0 => old_color,
-                ColorSource::Median => self.shown.median(),
-                ColorSource::Mean => pack(self.shown.sums().map(|sum| mean(sum, count))),
-                ColorSource::Pick | ColorSource::Evolved => self.picked(child),
-            };
-            return Some((child.with_color(unpack(color)), self.shown.change(color)));
-        };
-        if !has_new_color {
-            return Some((*child, dressed::change(&self.area, seen, suit, old_color)));
-        }
-        self.dressed.collect(&self.area, seen, suit);
-        if !self.dressed.shows() && paint == Paint::Birth {
-            return None;
-        }
-        let color = match source {
-            _ if !self.dressed.has_color() => old_color,
-            ColorSource::Median => self.dressed.median(),
-            ColorSource::Mean => self.dressed.mean(),
-            ColorSource::Pick | ColorSource::Evolved => self.picked(child),
-        };
-        Some((child.with_color(unpack(color)), self.dressed.change(color)))
+    fn footprint(&self, fly: &Fly) -> Footprint {
+        Footprint::of(fly, (self.shared.grid.width_px, self.shared.grid.height_px))
     }
 
     /// The target's pixel nearest to a fly's centre, packed.
@@ -308,7 +276,7 @@ impl<'a> Cell<'a> {
     /// What a fly wears; none in a plain search.
     fn suit(&self, fly: &Fly) -> Option<Suit<'a>> {
         let Course { masks, rules, .. } = self.shared.course;
-        (!self.is_plain && fly.alive).then(|| Suit::of(fly, masks, rules))
+        (!self.shared.is_plain && fly.alive).then(|| Suit::of(fly, masks, rules))
     }
 
     /// Whether no pixel's stack would become too deep.
@@ -321,75 +289,54 @@ impl<'a> Cell<'a> {
         let suit = self.suit(&child.fly);
         let cover = Cover { footprint: &child.footprint, suit: suit.as_ref() };
         self.area.exchange(&cover, &Cover::NONE, |block, &Exchanged { pixel, .. }| {
-            if usize::from(block.depth[pixel]) == STACK_DEPTH {
-                has_room &= block.stack[pixel].iter().any(|entry| entry.fly == victim);
-            }
+            has_room &= block.depth(pixel) < G::DEPTH_MAX || block.holds(pixel, victim);
         });
         has_room
     }
 
     /// Puts the child where its victim was.
     fn replace(&mut self, child: &Candidate) {
-        let shared = self.shared;
         let Member { index, fly: old, .. } = self.members[child.victim];
-        let old_footprint = Footprint::of(&old, (shared.grid.width_px, shared.grid.height_px));
-        let old_z = shared.depths[index as usize].load(Ordering::Relaxed);
-        shared.depths[index as usize].store(child.fly.z, Ordering::Relaxed);
-        let change = Exchange {
-            shared,
-            cell: self.number,
-            fly: index,
-            color: pack(child.fly.color()),
-            keeps_depth: old_z == child.fly.z,
-            // The colour of a dressed tile at a pixel depends on its edges, too.
-            keeps_color: self.is_plain && old.color() == child.fly.color(),
-        };
+        self.shared.depths[index as usize].store(child.fly.z, Ordering::Relaxed);
+        let footprint = self.footprint(&old);
         let suits = [self.suit(&old), self.suit(&child.fly)];
-        let covers = [
-            Cover { footprint: &old_footprint, suit: suits[0].as_ref() },
-            Cover { footprint: &child.footprint, suit: suits[1].as_ref() },
-        ];
-        exchange(&mut self.area, &covers, &change);
+        let swap = Swap {
+            index,
+            old: Piece { fly: &old, footprint: &footprint, suit: suits[0].as_ref() },
+            new: Piece { fly: &child.fly, footprint: &child.footprint, suit: suits[1].as_ref() },
+        };
+        G::swap(&mut self.area, self.shared, self.number, &swap, child.change);
         self.members[child.victim].fly = child.fly;
-        if shared.course.rules.penalties.turn > 0 {
-            let penalty = |fly: &Fly| {
-                let local = shared.course.guide.at(fly.x >> 6, fly.y >> 6);
-                if fly.alive { operators::turn_penalty(fly, &shared.course.rules, local) } else { 0 }
-            };
-            add(shared, self.number, index, penalty(&old) - penalty(&child.fly));
-        }
     }
 
-    /// Takes a fly off its pixels; its marginal fitness becomes 0.
-    fn take_away(&mut self, place: usize) {
-        let Member { index, fly, .. } = self.members[place];
-        let shared = self.shared;
-        let footprint = Footprint::of(&fly, (shared.grid.width_px, shared.grid.height_px));
-        let change =
-            Exchange { shared, cell: self.number, fly: index, color: 0, keeps_depth: false, keeps_color: false };
-        let suit = self.suit(&fly);
-        exchange(&mut self.area, &[Cover { footprint: &footprint, suit: suit.as_ref() }, Cover::NONE], &change);
-        shared.fitness[index as usize].store(0, Ordering::Relaxed);
-    }
-
-    /// Removes a fly that does not help.
+    /// Removes a fly that does not help; its marginal fitness becomes 0.
     fn remove_useless(&mut self, place: usize) {
-        let fitness = self.fitness(place);
-        if self.members[place].fly.alive && fitness <= 0 {
-            self.take_away(place);
-            self.done.change += fitness;
+        let Member { index, fly, .. } = self.members[place];
+        if !fly.alive {
+            return;
+        }
+        let footprint = self.footprint(&fly);
+        let suit = self.suit(&fly);
+        let swap = Swap {
+            index,
+            old: Piece { fly: &fly, footprint: &footprint, suit: suit.as_ref() },
+            new: Piece { fly: &Fly::ABSENT, footprint: &Footprint::EMPTY, suit: None },
+        };
+        let penalty = turn_penalty(self.shared.course, &fly);
+        let loss = G::loss(&mut self.area, &mut self.desk, self.shared, &swap, penalty);
+        if loss <= 0 {
+            G::swap(&mut self.area, self.shared, self.number, &swap, loss);
+            self.shared.fitness[index as usize].store(0, Ordering::Relaxed);
+            self.done.change += loss;
             self.members[place] = Member { fly: Fly::ABSENT, step: STEP_FIRST, ..self.members[place] };
         }
     }
 }
 
-/// How a child comes by its colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Paint {
-    /// It keeps its parent's.
-    Keep,
-    /// It takes a new one where it shows.
-    Anew,
-    /// It takes one, and must show somewhere.
-    Birth,
+/// What a fly costs for being turned away from the guide; nothing if it is absent.
+pub fn turn_penalty(course: &Course, fly: &Fly) -> i64 {
+    if course.rules.penalties.turn == 0 || !fly.alive {
+        return 0;
+    }
+    operators::turn_penalty(fly, &course.rules, course.guide.at(fly.x >> 6, fly.y >> 6))
 }

@@ -2,6 +2,7 @@
 //! `area`, pixel by pixel.
 
 use super::area::{Area, Child, SIDE, compare};
+use super::block::Block;
 use crate::model::cells::color::{mean, weighted_median};
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::pixel::{TRANSPARENT, difference};
@@ -12,7 +13,7 @@ use crate::model::mask::shaded;
 /// victim, if the child would be in front of it.
 #[inline(always)]
 fn each_covered(
-    area: &Area<'_>,
+    area: &Area<'_, Block>,
     child: &Child<'_>,
     suit: &Suit<'_>,
     mut visit: impl FnMut(Look, (u32, i32), Option<i32>),
@@ -39,7 +40,7 @@ fn each_covered(
 }
 
 /// As [`super::area::change`].
-pub fn change(area: &Area<'_>, child: &Child<'_>, suit: &Suit<'_>, color: u32) -> i64 {
+pub fn change(area: &Area<'_, Block>, child: &Child<'_>, suit: &Suit<'_>, color: u32) -> i64 {
     let mut sum = 0_i64;
     each_covered(area, child, suit, |look, pixel, shown| {
         let gain = shown.map_or(0, |shown| suit.error(look, color, pixel) - shown);
@@ -63,7 +64,7 @@ pub struct DressedShown {
 
 impl DressedShown {
     /// Collects the pixels where a child would show.
-    pub fn collect(&mut self, area: &Area<'_>, child: &Child<'_>, suit: &Suit<'_>) {
+    pub fn collect(&mut self, area: &Area<'_, Block>, child: &Child<'_>, suit: &Suit<'_>) {
         self.pixels.clear();
         self.weights.clear();
         self.channels.iter_mut().for_each(Vec::clear);

@@ -72,7 +72,7 @@ pub struct Exchange<'a> {
 
 /// Takes a fly off the pixels of one tile and puts it on those of another.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
-pub fn exchange(area: &mut Area<'_>, [old, new]: &[Cover<'_>; 2], change: &Exchange<'_>) {
+pub fn exchange(area: &mut Area<'_, Block>, [old, new]: &[Cover<'_>; 2], change: &Exchange<'_>) {
     let Exchange { shared, cell, fly, color, keeps_depth, keeps_color } = *change;
     let depth_of = |fly: u32| shared.depths[fly as usize].load(Ordering::Relaxed);
     let own_z = depth_of(fly);

@@ -5,32 +5,40 @@ mod block;
 mod cell;
 mod dressed;
 mod exchange;
+mod glazed;
+mod ground;
+mod laid;
+mod opaque;
+mod search;
+mod translucent;
 
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
 use rayon::prelude::*;
 
-use self::area::{Area, Shown};
-use self::block::{Block, PIXELS};
-use self::cell::{Cell, Done, Member, Shared};
-use self::dressed::DressedShown;
+pub use self::search::CpuSearch;
+
+use self::area::Area;
+use self::block::PIXELS;
+use self::cell::{Cell, Done, Member, Shared, turn_penalty};
+use self::ground::{Bare, Ground};
 use crate::error::Result;
+use crate::model::Fly;
 use crate::model::blocks::{depth_order, index_of};
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
-use crate::model::cells::pixel::{BACKGROUND_Z, INSIDE, TRANSPARENT, difference};
+use crate::model::cells::pixel::{INSIDE, TRANSPARENT, difference};
 use crate::model::cells::random::{Chain, Draw};
 use crate::model::cells::rules::STEP_FIRST;
 use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, depths, operators};
 use crate::model::cells::{Grid, NO_CELL};
 use crate::model::fly::Z_MAX;
 use crate::model::tile::pack;
-use crate::model::{Fly, NO_FLY};
 
-/// A search on the CPU.
-pub struct CpuSearch {
+/// A search among tiles of one kind.
+struct Cells<G> {
     course: Course,
-    blocks: Vec<Block>,
+    blocks: Vec<G>,
     /// Blocks along the width.
     columns: u32,
     flies: Vec<Fly>,
@@ -41,16 +49,14 @@ pub struct CpuSearch {
     standing: Standing,
 }
 
-impl CpuSearch {
-    /// A search that begins with absent flies.
-    #[must_use]
-    pub fn new(course: Course) -> Self {
+impl<G: Ground> Cells<G> {
+    fn new(course: Course) -> Self {
         let (width, height) = (course.target.width_px(), course.target.height_px());
         let (columns, rows) = (width.div_ceil(BLOCK_SIDE_PX), height.div_ceil(BLOCK_SIDE_PX));
         let fly_count = course.fly_count;
         let mut search = Self {
             course,
-            blocks: vec![Block::outside(); (columns * rows) as usize],
+            blocks: vec![G::outside(); (columns * rows) as usize],
             columns,
             flies: vec![Fly::ABSENT; fly_count],
             steps: vec![STEP_FIRST; fly_count],
@@ -68,7 +74,7 @@ impl CpuSearch {
         let Course { target, rules, .. } = &self.course;
         let (width, height) = (target.width_px(), target.height_px());
         for (number, block) in self.blocks.iter_mut().enumerate() {
-            *block = Block::outside();
+            *block = G::outside();
             let (x, y) = (number as u32 % self.columns * BLOCK_SIDE_PX, number as u32 / self.columns * BLOCK_SIDE_PX);
             for row in 0..BLOCK_SIDE_PX.min(height - y) {
                 for column in 0..BLOCK_SIDE_PX.min(width - x) {
@@ -77,15 +83,10 @@ impl CpuSearch {
                     let pixel = (row * BLOCK_SIDE_PX + column) as usize;
                     let weight = target.weights().map_or(1, |weights| i32::from(weights[place]));
                     let is_unwanted = target.transparent().is_some_and(|transparent| transparent[place]);
-                    let (flag, bare) = if is_unwanted {
-                        (TRANSPARENT, 0)
-                    } else {
-                        (0, difference(color, rules.background) * weight + rules.penalties.hole as i32)
-                    };
-                    block.target[pixel] = color | INSIDE | flag;
-                    block.weight[pixel] = weight;
-                    block.ground[pixel] = bare + rules.penalties.overlap as i32;
-                    block.surface(pixel, |_| BACKGROUND_Z as i32);
+                    let (flag, bare) =
+                        if is_unwanted { (TRANSPARENT, 0) } else { (0, difference(color, rules.background) * weight) };
+                    let bare = Bare { target: color | INSIDE | flag, weight, error: bare };
+                    block.lay_bare(pixel, &bare, rules);
                 }
             }
         }
@@ -97,19 +98,15 @@ impl CpuSearch {
 
     /// The objective, summed over pixels and flies.
     fn objective(&self) -> i64 {
-        let Course { rules, guide, .. } = &self.course;
-        let overlap = i64::from(rules.penalties.overlap);
         let of_pixels: i64 = self
             .blocks
             .iter()
             .flat_map(|block| {
-                (0..PIXELS).filter(|&pixel| block.target[pixel] & INSIDE != 0).map(move |pixel| (block, pixel))
+                (0..PIXELS).filter(|&pixel| block.target()[pixel] & INSIDE != 0).map(move |pixel| (block, pixel))
             })
-            .map(|(block, pixel)| i64::from(block.top.error[pixel]) + overlap * (i64::from(block.depth[pixel]) - 1))
+            .map(|(block, pixel)| block.objective(pixel, &self.course.rules))
             .sum();
-        let present = self.flies.iter().filter(|fly| fly.alive);
-        let of_flies: i64 =
-            present.map(|fly| operators::turn_penalty(fly, rules, guide.at(fly.x >> 6, fly.y >> 6))).sum();
+        let of_flies: i64 = self.flies.iter().map(|fly| turn_penalty(&self.course, fly)).sum();
         of_pixels + of_flies
     }
 
@@ -125,7 +122,6 @@ impl CpuSearch {
             self.size_px(),
             cell_side_px(self.course.rules.side),
         );
-        let is_plain = self.course.is_plain();
         let members = self.deal(&grid);
         let shared = Shared {
             course: &self.course,
@@ -133,9 +129,10 @@ impl CpuSearch {
             owners: &self.owners,
             fitness: &self.fitness,
             depths: &self.depths,
+            is_plain: self.course.is_plain(),
         };
         let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Step);
-        let mut areas: Vec<Vec<&mut Block>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+        let mut areas: Vec<Vec<&mut G>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
         for (number, block) in self.blocks.iter_mut().enumerate() {
             let (x, y) = (number as u32 % self.columns * BLOCK_SIDE_PX, number as u32 / self.columns * BLOCK_SIDE_PX);
             areas[grid.cell_at(x, y) as usize].push(block);
@@ -151,16 +148,7 @@ impl CpuSearch {
                 let first = ((x0 / BLOCK_SIDE_PX) as i32, (y0 / BLOCK_SIDE_PX) as i32);
                 let area = Area::new(blocks, columns, first);
                 let shared = &shared;
-                let mut cell = Cell {
-                    shared,
-                    number,
-                    area,
-                    members,
-                    is_plain,
-                    shown: Shown::default(),
-                    dressed: DressedShown::default(),
-                    done: Done::default(),
-                };
+                let mut cell = Cell { shared, number, area, members, desk: G::Desk::default(), done: Done::default() };
                 cell.run(chain.then(number));
                 (cell.members, cell.done)
             })
@@ -176,6 +164,20 @@ impl CpuSearch {
             self.standing.objective += done.change;
         }
         self.standing.rounds += 1;
+        self.refresh(&grid);
+    }
+
+    /// Brings marginal fitness up to date where cells only estimate it.
+    fn refresh(&self, grid: &Grid) {
+        let shared = Shared {
+            course: &self.course,
+            grid,
+            owners: &self.owners,
+            fitness: &self.fitness,
+            depths: &self.depths,
+            is_plain: self.course.is_plain(),
+        };
+        G::refresh(&self.blocks, &self.flies, &shared);
     }
 
     /// Gives every fly its cell.
@@ -205,7 +207,7 @@ impl CpuSearch {
         for number in 0..self.course.rules.deal_tournament {
             let (x, y) = (draws.below(2 * number, grid.width_px), draws.below(2 * number + 1, grid.height_px));
             let block = &self.blocks[(y / BLOCK_SIDE_PX * self.columns + x / BLOCK_SIDE_PX) as usize];
-            let error = block.top.error[(y % BLOCK_SIDE_PX * BLOCK_SIDE_PX + x % BLOCK_SIDE_PX) as usize];
+            let (error, _) = block.seen((y % BLOCK_SIDE_PX * BLOCK_SIDE_PX + x % BLOCK_SIDE_PX) as usize);
             if error > worst.0 {
                 worst = (error, grid.cell_at(x, y));
             }
@@ -214,7 +216,7 @@ impl CpuSearch {
     }
 }
 
-impl Search for CpuSearch {
+impl<G: Ground> Search for Cells<G> {
     fn course(&self) -> &Course {
         &self.course
     }
@@ -230,20 +232,12 @@ impl Search for CpuSearch {
             owners: &self.owners,
             fitness: &self.fitness,
             depths: &self.depths,
+            is_plain: self.course.is_plain(),
         };
-        let is_plain = self.course.is_plain();
         let area = Area::new(self.blocks.iter_mut().collect(), self.columns as usize, (0, 0));
         let members = (0..).zip(flies).map(|(index, _)| Member { index, fly: Fly::ABSENT, step: STEP_FIRST }).collect();
-        let mut cell = Cell {
-            shared: &shared,
-            number: 0,
-            area,
-            members,
-            is_plain,
-            shown: Shown::default(),
-            dressed: DressedShown::default(),
-            done: Done::default(),
-        };
+        let mut cell =
+            Cell { shared: &shared, number: 0, area, members, desk: G::Desk::default(), done: Done::default() };
         // Nearest first, so that it is the deepest flies that find no room.
         for key in depth_order(flies) {
             let index = index_of(key) as usize;
@@ -257,6 +251,7 @@ impl Search for CpuSearch {
             self.flies[index as usize] = fly;
         }
         self.standing.objective = self.objective();
+        self.refresh(&grid);
         Ok(())
     }
 
@@ -272,13 +267,7 @@ impl Search for CpuSearch {
         }
         let depths = &self.depths;
         self.blocks.par_iter_mut().for_each(|block| {
-            for layer in [&mut block.top, &mut block.under] {
-                for (z, &fly) in layer.z.iter_mut().zip(&layer.fly) {
-                    if fly != NO_FLY {
-                        *z = depths[fly as usize].load(Ordering::Relaxed) as i32;
-                    }
-                }
-            }
+            block.renumber(|fly| depths[fly as usize].load(Ordering::Relaxed));
         });
         Ok(())
     }
@@ -297,7 +286,7 @@ impl Search for CpuSearch {
         let stack_at = |x: u32, y: u32| {
             let block = &self.blocks[(y / BLOCK_SIDE_PX * self.columns + x / BLOCK_SIDE_PX) as usize];
             let pixel = (y % BLOCK_SIDE_PX * BLOCK_SIDE_PX + x % BLOCK_SIDE_PX) as usize;
-            block.stack[pixel][..usize::from(block.depth[pixel])].iter().map(|entry| (entry.fly, entry.error)).collect()
+            block.stack(pixel)
         };
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| stack_at(x, y)).collect();
         Ok(Stacks { pixels })

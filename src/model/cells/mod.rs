@@ -7,6 +7,7 @@
 pub mod color;
 pub mod depths;
 pub mod footprint;
+pub mod glaze;
 pub mod grid;
 pub mod operators;
 pub mod pixel;

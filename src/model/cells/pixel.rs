@@ -5,6 +5,8 @@
 /// Most flies that may lie on one pixel. A child that would stack deeper is refused, so that the stacks are always whole
 /// and no answer can be wrong.
 pub const STACK_DEPTH: usize = 16;
+/// As [`STACK_DEPTH`], of translucent tiles, which show through each other.
+pub const TRANSLUCENT_DEPTH: usize = 24;
 /// Depth of the background: behind every fly.
 pub const BACKGROUND_Z: u32 = 1 << 24;
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::rules::Rules;
 use crate::error::Result;
-use crate::model::{Fly, Guide, MaskSet, Target};
+use crate::model::{Blend, Fly, Guide, MaskSet, Target};
 
 /// What stays the same while a picture is searched.
 #[derive(Clone, Debug)]
@@ -25,10 +25,20 @@ impl Course {
     /// Whether all tiles are squares of one colour without grout, and all pixels count the same: evaluators have a faster way for that.
     #[must_use]
     pub fn is_plain(&self) -> bool {
-        self.masks.layers().len() == 1
+        !self.is_translucent()
+            && self.masks.layers().len() == 1
             && self.rules.grout == 0
             && self.target.weights().is_none()
             && self.target.transparent().is_none()
+    }
+}
+
+impl Course {
+    /// Whether the masks' coverage is opacity: then pixels show all tiles on them, nearest first ([`crate::model::translucency`]), tiles
+    /// have no grout, and the only penalty is that for turning.
+    #[must_use]
+    pub fn is_translucent(&self) -> bool {
+        self.masks.blend() == Blend::Translucent
     }
 }
 
@@ -58,10 +68,11 @@ pub struct SearchState {
     pub fitness: Vec<i64>,
 }
 
-/// The flies on every pixel, nearest first, and their errors; pixels row by row.
+/// The flies on every pixel, nearest first, and their errors or, if they are translucent, their looks (`model::cells::glaze`); pixels
+/// row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stacks {
-    /// Per pixel, (fly, error) of each fly on it.
+    /// Per pixel, (fly, error or look) of each fly on it.
     pub pixels: Vec<Vec<(u32, i32)>>,
 }
 

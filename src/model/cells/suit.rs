@@ -1,12 +1,12 @@
 //! What a tile wears: its mask, its shades and its ring of grout, and what that makes of its error at a pixel.
 //!
-//! Twin: `glsl/shared/cells_suit.glsl`. The rules are those of [`crate::model::Tile`] for opaque masks.
+//! Twin: `glsl/shared/cells_suit.glsl`. The rules are those of [`crate::model::Tile`].
 
 use super::footprint::Footprint;
 use super::pixel::{TRANSPARENT, UNWANTED_ERROR, difference};
 use super::rules::Rules;
 use crate::model::Fly;
-use crate::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE, MaskSet, Texel, shaded};
+use crate::model::mask::{Blend, COVERAGE_THRESHOLD, MASK_SIDE, MaskSet, TEXELS, Texel, shaded};
 use crate::model::tables::TRIG_ONE;
 use crate::model::tile::{inverse, quotient};
 
@@ -14,7 +14,9 @@ use crate::model::tile::{inverse, quotient};
 #[derive(Clone, Copy, Debug)]
 pub struct Suit<'a> {
     /// Its mask's texels; none is the full square.
-    texels: Option<&'a [Texel]>,
+    texels: Option<&'a [Texel; TEXELS]>,
+    /// Coverage from which a texel is no hole.
+    threshold: u8,
     /// Sides in 1/64 px and their inverses.
     w: u32,
     h: u32,
@@ -42,7 +44,11 @@ impl<'a> Suit<'a> {
         let is_masked = fly.mask > 0;
         let inverse_of = |side| if is_masked { inverse(side) } else { 0 };
         Self {
-            texels: is_masked.then(|| &masks.layers()[usize::from(fly.mask)].texels()[..]),
+            texels: is_masked.then(|| masks.layers()[usize::from(fly.mask)].texels()),
+            threshold: match masks.blend() {
+                Blend::Opaque => COVERAGE_THRESHOLD,
+                Blend::Translucent => 1,
+            },
             w: fly.w,
             h: fly.h,
             w_inverse: inverse_of(fly.w),
@@ -52,21 +58,34 @@ impl<'a> Suit<'a> {
         }
     }
 
+    /// Its texel at tile coordinates inside its rectangle; elsewhere any texel.
+    #[inline(always)]
+    #[must_use]
+    pub fn texel(&self, u: u32, v: u32) -> Texel {
+        const STEPS_PER_TEXEL: u32 = TRIG_ONE as u32 / MASK_SIDE as u32;
+        let Some(texels) = self.texels else { return Texel { coverage: 255, shade: 255 } };
+        let column = quotient(u / STEPS_PER_TEXEL, self.w, self.w_inverse);
+        let row = quotient(v / STEPS_PER_TEXEL, self.h, self.h_inverse);
+        texels[row.wrapping_mul(MASK_SIDE as u32).wrapping_add(column) as usize % TEXELS]
+    }
+
+    /// Its texel so many pixels to the right of tile coordinates.
+    #[inline(always)]
+    #[must_use]
+    pub fn texel_at(&self, footprint: &Footprint, (u, v): (i32, i32), right_px: i32) -> Texel {
+        let by = |step: i32| step.wrapping_mul(right_px);
+        self.texel(u.wrapping_add(by(footprint.cos)) as u32, v.wrapping_sub(by(footprint.sin)) as u32)
+    }
+
     /// What the tile shows at tile coordinates inside its rectangle; none in a hole of its mask.
     #[inline(always)]
     #[must_use]
     pub fn look(&self, footprint: &Footprint, u: u32, v: u32) -> Option<Look> {
-        let mut shade = 255;
-        if let Some(texels) = self.texels {
-            const STEPS_PER_TEXEL: u32 = TRIG_ONE as u32 / MASK_SIDE as u32;
-            let column = quotient(u / STEPS_PER_TEXEL, self.w, self.w_inverse);
-            let row = quotient(v / STEPS_PER_TEXEL, self.h, self.h_inverse);
-            let texel = texels[(row * MASK_SIDE as u32 + column) as usize];
-            if texel.coverage < COVERAGE_THRESHOLD {
-                return None;
-            }
-            shade = u32::from(texel.shade);
+        let texel = self.texel(u, v);
+        if texel.coverage < self.threshold {
+            return None;
         }
+        let shade = u32::from(texel.shade);
         let within = |place: u32, end: i32| place.wrapping_sub(self.ring) < (end as u32).saturating_sub(2 * self.ring);
         let is_inside = within(u, footprint.u_end) & within(v, footprint.v_end);
         Some(if is_inside { Look::Shade(shade) } else { Look::Grout })
