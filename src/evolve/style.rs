@@ -132,7 +132,7 @@ impl Style {
             shader: "template".to_owned(),
             blend: Blend::Opaque,
             opacity: 255,
-            recolor_q16: ONE_Q16 / 5,
+            recolor_q16: ONE_Q16 / 2,
         }
     }
 

@@ -82,7 +82,7 @@ fn side_max(rules: &Rules) -> u32 {
     let scale = classes.iter().map(|class| class.scale_q12).max().unwrap_or(1 << 12);
     let local = if rules.bounds.local_size == 0 { 1 } else { 4 };
     let own = (u64::from(rules.side) * u64::from(scale) * local) >> 12;
-    let side = own.min(u64::from(SEARCH_SIDE_MAX)) * u64::from(rules.bounds.side_max_q8) >> 8;
+    let side = (own.min(u64::from(SEARCH_SIDE_MAX)) * u64::from(rules.bounds.side_max_q8)) >> 8;
     side.min(u64::from(SEARCH_SIDE_MAX)) as u32
 }
 
