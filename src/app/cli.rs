@@ -7,12 +7,13 @@ use std::time::Duration;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
+use super::bench::BenchArgs;
 use super::cells::CellsArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
 use super::look::LookArgs;
 use super::paper::PaperArgs;
-use super::presets::{self, Preset};
+use super::presets::{self, PresetChoice};
 use super::render::RenderArgs;
 use super::scheme::{ColorModeName, PaperSchemeArgs};
 use super::score::ScoreArgs;
@@ -101,18 +102,21 @@ pub(super) enum Command {
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed with
     /// numpy, scipy and scikit-image. Of an animation the first frame is measured.
     Score(ScoreArgs),
+    /// Measure how fast this machine evolves pictures
+    Bench(BenchArgs),
 }
 
 const EVOLVE_EXAMPLES: &str = "\
 Examples:
   smalti evolve photo.jpg -o mosaic.png
   smalti evolve photo.jpg -o mosaic.png -o flies.npz -n 10k --evals 20M
+  smalti evolve photo.jpg -o mosaic.png --style mosaic --grout auto -n 4000
   smalti evolve photo.jpg -o paper.png --scheme paper --births 200k --restarts 3 --cool 0.5
   smalti evolve photo.jpg -o poster.png --output-size 4096 --time 2m
   smalti evolve photo.jpg -o better.png --init flies.npz --seed 1
   smalti evolve photo.jpg -o - --quiet > mosaic.png";
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = EVOLVE_EXAMPLES)]
 pub(super) struct EvolveArgs {
     /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP, or the first frame of a GIF
@@ -161,7 +165,8 @@ pub(super) struct EvolveArgs {
     /// Palette that picture and tiles are held to: .gpl, .pal, .hex (lines of RRGGBB), or the colours of a picture
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     pub palette: Option<PathBuf>,
-    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: black, or as in --init]
+    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: as in --init or the style, or
+    /// black; what is transparent stays so, but not with --scheme paper]
     #[arg(long, value_name = "COLOR", value_parser = values::color, help_heading = "Picture")]
     pub background: Option<Rgb>,
     /// Map that tells where likeness matters, a picture with the proportions of IN: an error counts 16 times as much where
@@ -179,9 +184,10 @@ pub(super) struct EvolveArgs {
     /// needs]
     #[arg(long, value_enum, value_name = "NAME", help_heading = "Evolution")]
     pub scheme: Option<SchemeName>,
-    /// What other options begin from and change parts of: one of the paper's 12 schemes (Table 1), paper-1 to paper-12
-    #[arg(long, value_name = "NAME", value_parser = presets::parse, help_heading = "Evolution")]
-    pub preset: Option<Preset>,
+    /// What other options begin from and change parts of: one of the paper's 12 schemes (Table 1), paper-1 to paper-12; a
+    /// style; or a file of your own that ends in .toml
+    #[arg(long, value_name = "NAME|FILE", value_parser = presets::parse, help_heading = "Evolution")]
+    pub preset: Option<PresetChoice>,
     /// Where the colour of a new tile comes from [default: median, or evolved with --scheme paper]
     #[arg(long, value_enum, value_name = "MODE", help_heading = "Evolution")]
     pub color_mode: Option<ColorModeName>,

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use crate::cpu::CpuEvaluator;
 use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
-use crate::gpu::GpuEvaluator;
+use crate::gpu::{GpuEvaluator, VulkanSearch};
 use crate::model::cells::{Course, Search};
-use crate::model::{Evaluator, Scene};
+use crate::model::{Evaluator, Fly, Scene};
 use crate::vk::{
     Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, ValidationLog, choose,
 };
@@ -28,6 +28,33 @@ pub(super) struct Opened {
     pub evaluator: Box<dyn Evaluator>,
     /// What the validation layer says; complete once the evaluator is gone.
     pub validation_log: Option<Arc<ValidationLog>>,
+}
+
+/// An evaluator whose passes are timed where they run on a device.
+pub(super) enum Timed {
+    Cpu(CpuEvaluator),
+    Vulkan(Box<GpuEvaluator>),
+}
+
+impl Timed {
+    /// As [`Evaluator::load`].
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(super) fn load(&mut self, populations: &[(usize, &[Fly])]) -> Result<()> {
+        match self {
+            Self::Cpu(evaluator) => evaluator.load(populations),
+            Self::Vulkan(evaluator) => evaluator.load(populations),
+        }
+    }
+
+    /// Name and milliseconds of each pass of the last evaluation; none where there are no timestamps.
+    pub(super) fn pass_times(&self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::Cpu(_) => Vec::new(),
+            Self::Vulkan(evaluator) => evaluator.pass_times().iter().map(|time| (time.name, time.ms)).collect(),
+        }
+    }
 }
 
 /// A search that is ready to begin.
@@ -107,16 +134,38 @@ impl Selected {
         }
     }
 
+    /// An evaluator that tells how long its passes took on the device.
+    ///
+    /// # Errors
+    /// If the device has no room for the scenes.
+    pub(super) fn open_timed(&self, scenes: Vec<Scene>) -> Result<Timed> {
+        match self {
+            Self::Cpu { .. } => Ok(Timed::Cpu(CpuEvaluator::new(scenes))),
+            Self::Vulkan { device, .. } => Ok(Timed::Vulkan(Box::new(GpuEvaluator::create_timed(device, scenes)?))),
+        }
+    }
+
+    /// Name and version of the Vulkan driver.
+    pub(super) fn driver(&self) -> Option<String> {
+        match self {
+            Self::Cpu { .. } => None,
+            Self::Vulkan { device, .. } => {
+                let info = device.info();
+                Some(format!("{} {}", info.driver_name, info.driver_info).trim().to_owned())
+            }
+        }
+    }
+
     /// A search in cells on this device, which begins with absent flies.
     ///
     /// # Errors
-    /// [`Error::NoSuitableDevice`] if the device cannot search.
+    /// If the device has no room for the search, or its numbers do not fit it.
     pub(super) fn open_search(&self, course: Course) -> Result<OpenedSearch> {
         match self {
             Self::Cpu { .. } => Ok(OpenedSearch { search: Box::new(CpuSearch::new(course)), validation_log: None }),
-            Self::Vulkan { device, .. } => {
-                let why = format!("{} cannot search in cells; use --device cpu or --scheme paper", device.info().name);
-                Err(Error::NoSuitableDevice { why })
+            Self::Vulkan { device, validation_log } => {
+                let search = Box::new(VulkanSearch::new(device, course)?);
+                Ok(OpenedSearch { search, validation_log: Some(Arc::clone(validation_log)) })
             }
         }
     }

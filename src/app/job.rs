@@ -10,11 +10,9 @@ use super::options::{Colors, EvolveOptions, SchemeOptions};
 use crate::archive;
 use crate::error::{Error, Result};
 use crate::evolve::{Palette, PaperScheme, begin_from, first_population};
-use crate::guide;
 use crate::model::cells::Course;
-use crate::model::operators::tile_side;
 use crate::model::target::weight_of_luma;
-use crate::model::{Fly, MaskSet, Population, Rgb, Scene, Target};
+use crate::model::{Backdrop, Blend, Fly, Grout, MaskSet, Population, Rgb, Scene, Target};
 use crate::photo::{self, Background, Loaded, Photo, ReadOptions};
 
 /// The inputs of one evolution, read and fitted together.
@@ -35,6 +33,8 @@ pub(super) struct Job {
     pub palette: Option<Palette>,
     /// How many colours the target was reduced to, if it was.
     pub color_count: Option<usize>,
+    /// The ring of every tile, if a search gives them one.
+    pub grout: Option<Grout>,
     /// The masks that were asked for; none leaves the flies as they are, which is square unless `init` says otherwise.
     pub dress: Option<Dress>,
     /// The population to begin with, if not a random one.
@@ -50,7 +50,8 @@ impl Job {
     pub(super) fn load(options: &EvolveOptions) -> Result<Self> {
         let init = options.init.as_deref().map(archive::read).transpose()?.map(|archive| archive.population);
         let of_init = init.as_ref().map(|population| population.background.color());
-        let background = options.background.or(of_init).unwrap_or_default();
+        let asked_for = options.background.or(of_init);
+        let background = asked_for.unwrap_or_default();
         let behind = if keeps_transparency(options) { Background::Transparent } else { Background::Color(background) };
         let reading = ReadOptions { background: behind, long_side_px: Some(options.long_side_px) };
         let Picture { target, palette, original_size_px, sha256, warnings } =
@@ -68,8 +69,19 @@ impl Job {
             memory::check(usual_bytes.saturating_add(memory::list_bytes(population)))?;
         }
         let fly_count = init.as_ref().map(|population| population.flies.len()).or(options.fly_count);
-        Ok(Self {
-            fly_count: fly_count.unwrap_or_else(|| default_fly_count(target.width_px(), target.height_px())),
+        let fly_count = fly_count.unwrap_or_else(|| default_fly_count(target.width_px(), target.height_px()));
+        let grout = match &options.scheme {
+            SchemeOptions::Cells(cells) => cells.grout(&target, fly_count),
+            SchemeOptions::Paper(_) => None,
+        };
+        let background = match &options.scheme {
+            // Where nothing lies behind the tiles, an uncovered pixel counts as black.
+            SchemeOptions::Cells(_) if target.transparent().is_some() => [0; 3],
+            SchemeOptions::Cells(cells) if asked_for.is_none() => cells.ground(&target, grout),
+            _ => background,
+        };
+        let job = Self {
+            fly_count,
             target: Arc::new(target),
             original_size_px,
             input_sha256: sha256,
@@ -78,9 +90,15 @@ impl Job {
             scheme,
             palette,
             color_count: if let Colors::Few(count) = options.colors { Some(count) } else { None },
+            grout,
             dress,
             init,
-        })
+        };
+        if matches!(options.scheme, SchemeOptions::Cells(_)) && job.masks().blend() == Blend::Translucent {
+            let sentence = "--scheme cells has opaque tiles only; use --scheme paper for translucent ones";
+            return Err(Error::Usage(sentence.to_owned()));
+        }
+        Ok(job)
     }
 
     /// The tile shapes that the flies may wear.
@@ -91,11 +109,12 @@ impl Job {
 
     /// These flies as a population of this picture.
     pub(super) fn population(&self, flies: Vec<Fly>) -> Population {
+        let is_cut = self.target.transparent().is_some();
         Population {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
-            background: self.background.into(),
-            grout: None,
+            background: if is_cut { Backdrop::Transparent } else { self.background.into() },
+            grout: self.grout,
             masks: self.masks(),
             flies,
         }
@@ -127,14 +146,25 @@ impl Job {
 
     /// What a search in cells goes by.
     pub(super) fn course(&self, cells: &CellsOptions) -> Course {
-        let side = tile_side(self.target.width_px(), self.target.height_px(), self.fly_count);
+        let masks = self.masks();
         Course {
-            rules: cells.rules((side, self.fly_count), self.background),
-            guide: Arc::new(guide::sharp(&self.target)),
+            rules: cells.rules(self, self.layers_worn(&masks)),
+            guide: Arc::new(cells.guide(&self.target, self.fly_count)),
             target: Arc::clone(&self.target),
-            masks: Arc::new(self.masks()),
+            masks: Arc::new(masks),
             fly_count: self.fly_count,
         }
+    }
+
+    /// The first mask layer that newborn tiles wear, and how many: those that were asked for, or that given flies wear.
+    fn layers_worn(&self, masks: &MaskSet) -> (u32, u32) {
+        let named = self.dress.iter().flat_map(|dress| dress.layers_by_run.iter().flatten().copied());
+        let given = self.init.iter().flat_map(|population| &population.flies);
+        let given = given.filter(|fly| fly.alive && self.dress.is_none()).map(|fly| fly.mask);
+        let layers: Vec<u32> = named.chain(given).map(u32::from).collect();
+        let first = layers.iter().copied().min().unwrap_or(0);
+        let last = layers.iter().copied().max().unwrap_or(0).min(masks.layers().len() as u32 - 1);
+        (first, last - first + 1)
     }
 }
 

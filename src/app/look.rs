@@ -100,6 +100,14 @@ impl Look {
         Ok(Self { masks, restart_masks, shader: args.shader.unwrap_or(Shader::Template), blend, opacity })
     }
 
+    /// With these masks, if none were asked for.
+    pub(super) fn or_masks(mut self, names: &[String]) -> Self {
+        if self.masks.is_empty() {
+            self.masks = names.iter().map(PathBuf::from).collect();
+        }
+        self
+    }
+
     /// Whether nothing was asked for.
     pub(super) fn is_default(&self) -> bool {
         self.masks.is_empty()

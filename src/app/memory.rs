@@ -7,6 +7,8 @@ use crate::model::{Backdrop, Canvas, Population, Tile};
 // 1,000,000 at 512x512, since lists grow while tiles gather.
 /// Bytes per pixel of the evolved picture: its layers, its share of block lists, target and mosaic.
 const BYTES_PER_PIXEL: u64 = 40;
+/// Bytes per pixel of a picture that is searched: two layers, errors, and a stack of 16 flies with theirs.
+const BYTES_PER_SEARCHED_PIXEL: u64 = 176;
 /// Bytes per fly: genes in the current and best population, tile, fitness, and its entries in block lists.
 const BYTES_PER_FLY: u64 = 512;
 /// Bytes per pixel of the written picture: the mosaic, the encoder's copy, and the encoded file.
@@ -46,6 +48,11 @@ pub(super) fn estimate_bytes(pixel_count: u64, fly_count: usize, output_pixel_co
     pixel_count * BYTES_PER_PIXEL
         + fly_count as u64 * BYTES_PER_FLY
         + output_pixel_count.saturating_mul(BYTES_PER_OUTPUT_PIXEL)
+}
+
+/// About how many bytes a search in cells keeps of so many pixels, besides what an evolution does.
+pub(super) fn search_bytes(pixel_count: u64) -> u64 {
+    pixel_count.saturating_mul(BYTES_PER_SEARCHED_PIXEL)
 }
 
 /// Refuses what needs more memory than there is; passes where that is not known.

@@ -3,6 +3,7 @@
 //! Only this module prints, reads the clock, the environment, or paths given by the user. Failures end as one sentence
 //! on stderr; stdout carries data only.
 
+mod bench;
 mod cells;
 mod child;
 mod cli;
@@ -52,5 +53,6 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
+        cli::Command::Bench(args) => bench::bench(args),
     }
 }

@@ -4,12 +4,13 @@ use std::iter;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use super::cells::CellsOptions;
+use super::cells::{CellsOptions, PresetFile};
 use super::cli::{EvolveArgs, ProgressKind, SchemeName};
 use super::computing::Computing;
 use super::curve_file::CurveFile;
 use super::destination::{self, Destination};
 use super::look::Look;
+use super::presets::{Preset, PresetChoice};
 use super::scheme;
 use super::snapshots::SaveRun;
 use super::values::ColorCount;
@@ -60,10 +61,13 @@ pub(super) enum SchemeOptions {
 }
 
 impl SchemeOptions {
-    fn new(args: &EvolveArgs) -> Result<Self> {
+    fn new(args: &EvolveArgs, file: Option<&PresetFile>) -> Result<Self> {
         match scheme_name(args) {
-            SchemeName::Cells => CellsOptions::new(args).map(Self::Cells),
-            SchemeName::Paper => scheme::paper_scheme(args, args.preset).map(Self::Paper),
+            SchemeName::Cells => CellsOptions::new(args, file).map(Self::Cells),
+            SchemeName::Paper => {
+                let preset = args.preset.as_ref().and_then(PresetChoice::paper);
+                scheme::paper_scheme(args, preset).map(Self::Paper)
+            }
         }
     }
 }
@@ -110,9 +114,18 @@ impl EvolveOptions {
     /// [`Error::Usage`] that names the flag and what it may be.
     pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
         check_scheme_knows(args)?;
+        let file = if let Some(PresetChoice::File(path)) = &args.preset { Some(PresetFile::read(path)?) } else { None };
+        let filled = file.as_ref().map(|file| file.fill(args.clone()));
+        let args = filled.as_ref().unwrap_or(args);
+        let preset = args.preset.as_ref().and_then(PresetChoice::paper);
+        let scheme = SchemeOptions::new(args, file.as_ref())?;
+        let mut look = Look::new(&args.look, &args.paper.restart_masks, preset)?;
+        if let SchemeOptions::Cells(cells) = &scheme {
+            look = look.or_masks(cells.masks());
+        }
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
         let validation = if args.validate { Validation::On } else { Validation::Off };
-        let preset_side = args.preset.map(|preset| u64::from(preset.side_px));
+        let preset_side = preset.map(|preset| u64::from(preset.side_px));
         let options = Self {
             input: args.input.clone(),
             outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
@@ -124,12 +137,12 @@ impl EvolveOptions {
             mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
             fly_count: fly_count.map(|count| count as usize),
             long_side_px: side_px("--size", args.size.unwrap_or(preset_side.unwrap_or(LONG_SIDE_PX)))?,
-            colors: colors(args),
+            colors: colors(args, preset),
             weight: args.weight.clone(),
-            look: Look::new(&args.look, &args.paper.restart_masks, args.preset)?,
+            look,
             background: args.background,
             init: args.init.clone(),
-            scheme: SchemeOptions::new(args)?,
+            scheme,
             time_limit: args.time,
             computing: args.computing.check(validation)?,
             progress: args.progress.unless(args.quiet),
@@ -175,8 +188,8 @@ pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
     Ok(())
 }
 
-fn colors(args: &EvolveArgs) -> Colors {
-    let of_preset = args.preset.and_then(|preset| preset.color_count);
+fn colors(args: &EvolveArgs, preset: Option<Preset>) -> Colors {
+    let of_preset = preset.and_then(|preset| preset.color_count);
     match (&args.palette, args.colors) {
         (Some(path), _) => Colors::Palette(path.clone()),
         (None, Some(ColorCount::Few(count))) => Colors::Few(count),
@@ -187,21 +200,26 @@ fn colors(args: &EvolveArgs) -> Colors {
 
 /// The scheme that was asked for, by name or by what needs it.
 pub(super) fn scheme_name(args: &EvolveArgs) -> SchemeName {
-    args.scheme.unwrap_or(if args.preset.is_some() { SchemeName::Paper } else { SchemeName::Cells })
+    let of_paper = matches!(args.preset, Some(PresetChoice::Paper(_)));
+    args.scheme.unwrap_or(if of_paper { SchemeName::Paper } else { SchemeName::Cells })
 }
 
 /// Refuses flags that the scheme has no use for.
 fn check_scheme_knows(args: &EvolveArgs) -> Result<()> {
-    let (other, given) = match scheme_name(args) {
+    let this = scheme_name(args);
+    let of_paper = matches!(args.preset, Some(PresetChoice::Paper(_)));
+    let preset = args.preset.as_ref().filter(|_| of_paper != (this == SchemeName::Paper));
+    let (other, given) = match this {
         SchemeName::Paper if args.weight.is_some() => {
             let sentence = "--weight: the paper's scheme weighs all pixels alike; use --scheme cells";
             return Err(Error::Usage(sentence.to_owned()));
         }
         SchemeName::Paper => (SchemeName::Cells, args.cells.given()),
-        SchemeName::Cells => (SchemeName::Paper, args.paper.given().or(args.preset.map(|_| "--preset paper-N"))),
+        SchemeName::Cells => (SchemeName::Paper, args.paper.given()),
     };
+    let given = given.map(str::to_owned).or(preset.map(|preset| format!("--preset {preset}")));
     given.map_or(Ok(()), |flag| {
-        let (other, this) = (other.word(), scheme_name(args).word());
+        let (other, this) = (other.word(), this.word());
         Err(Error::Usage(format!(
             "{flag}: only --scheme {other} has it, and this is --scheme {this}; drop one of them"
         )))

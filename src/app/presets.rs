@@ -1,6 +1,10 @@
-//! Presets: the 12 schemes of the paper (Table 1) by name.
+//! Presets: the 12 schemes of the paper (Table 1) and the styles of the `cells` scheme by name, and files of one's own.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
 
 use crate::evolve::scheme::PAPER_BIRTHS;
+use crate::evolve::style::Style;
 
 /// How many tile shapes a scheme uses, and when (Table 1, "shaders").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,9 +73,59 @@ impl Preset {
     }
 }
 
+/// What was named by `--preset`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum PresetChoice {
+    /// A scheme of the paper.
+    Paper(Preset),
+    /// A style.
+    Style(String),
+    /// A file of the user's.
+    File(PathBuf),
+}
+
+impl PresetChoice {
+    /// The scheme of the paper, if it is one.
+    pub(super) fn paper(&self) -> Option<Preset> {
+        if let Self::Paper(preset) = self { Some(*preset) } else { None }
+    }
+}
+
+impl fmt::Display for PresetChoice {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Paper(preset) => write!(out, "{}", preset.name()),
+            Self::Style(name) => write!(out, "{name}"),
+            Self::File(path) => write!(out, "{}", path.display()),
+        }
+    }
+}
+
+/// The names of all styles, for people.
+pub(super) fn style_names() -> String {
+    let names: Vec<&str> = Style::NAMES.into_iter().filter(|name| Style::named(name).is_some()).collect();
+    names.join(", ")
+}
+
+/// Reads the name of a style; a refusal says which there are.
+pub(super) fn parse_style(name: &str) -> Result<String, String> {
+    let known = Style::named(name).map(|_| name.to_owned());
+    known.ok_or_else(|| format!("there is no such style; there are {}", style_names()))
+}
+
 /// Reads the name of a preset; a refusal says which there are.
-pub(super) fn parse(name: &str) -> Result<Preset, String> {
-    Preset::named(name).ok_or_else(|| "there is no such preset; there are paper-1 to paper-12".to_owned())
+pub(super) fn parse(name: &str) -> Result<PresetChoice, String> {
+    if let Some(preset) = Preset::named(name) {
+        return Ok(PresetChoice::Paper(preset));
+    }
+    if Style::named(name).is_some() {
+        return Ok(PresetChoice::Style(name.to_owned()));
+    }
+    if Path::new(name).extension().is_some_and(|extension| extension == "toml") {
+        return Ok(PresetChoice::File(name.into()));
+    }
+    let styles = style_names();
+    Err(format!("there is no such preset; there are paper-1 to paper-12, {styles}, and files that end in .toml"))
 }
 
 #[cfg(test)]
@@ -87,5 +141,13 @@ mod tests {
         }
         assert_eq!(Preset::named("paper-12").map(|p| p.number), Some(12));
         assert!(parse("paper-13").is_err() && parse("paper-0").is_err() && parse("paper-01").is_err());
+    }
+
+    #[test]
+    fn a_preset_is_a_scheme_of_the_paper_a_style_or_a_file() {
+        assert_eq!(parse("mosaic"), Ok(PresetChoice::Style("mosaic".to_owned())));
+        assert_eq!(parse("my/own.toml"), Ok(PresetChoice::File("my/own.toml".into())));
+        assert_eq!(parse("paper-3").map(|preset| preset.paper()), Ok(Some(Preset::paper(3))));
+        assert!(parse("toml").is_err() && parse_style("toml").is_err());
     }
 }

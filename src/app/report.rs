@@ -267,7 +267,7 @@ fn look_line(options: &EvolveOptions, job: &Job) -> Option<String> {
     told.extend(job.palette.as_ref().map(|palette| format!("palette of {}", palette.colors().len())));
     told.extend(match &job.scheme {
         SchemeOptions::Paper(scheme) => scheme::told(scheme),
-        SchemeOptions::Cells(cells) => cells.told(),
+        SchemeOptions::Cells(cells) => cells.told(job),
     });
     (!told.is_empty()).then(|| told.join("; "))
 }

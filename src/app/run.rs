@@ -120,11 +120,12 @@ fn begin_record(options: &EvolveOptions, job: &Job, provenances: &Provenances) -
 
 /// Checks what depends on the picture's size; returns about how many bytes the work needs.
 fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
-    if let SchemeOptions::Paper(scheme) = &job.scheme {
-        scheme::check_fly_count(scheme, job.fly_count)?;
-    }
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let pixel_count = u64::from(width_px) * u64::from(height_px);
+    let search_bytes = match &job.scheme {
+        SchemeOptions::Cells(_) => memory::search_bytes(pixel_count),
+        SchemeOptions::Paper(scheme) => scheme::check_fly_count(scheme, job.fly_count).map(|()| 0)?,
+    };
     let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
     let output_pixel_count =
         output.map_or(pixel_count, |canvas| u64::from(canvas.width_px) * u64::from(canvas.height_px));
@@ -136,7 +137,8 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
         job.fly_count,
         output_pixel_count * destination::memory_weight(&options.outputs),
     )
-    .saturating_add(list_bytes);
+    .saturating_add(list_bytes)
+    .saturating_add(search_bytes);
     memory::check(needed_bytes)?;
     Ok(needed_bytes)
 }

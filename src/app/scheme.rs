@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use super::cli::EvolveArgs;
@@ -24,7 +25,7 @@ const COOL_MIN: f64 = 0.00001;
 const TILE_SCALES: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 /// The flags that only the paper's scheme has.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Evolution with --scheme paper")]
 pub(super) struct PaperSchemeArgs {
     /// Births of each run (suffixes k, M) [default: 40k]
@@ -73,7 +74,8 @@ pub(super) enum OnDryName {
     Stop,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub(super) enum ColorModeName {
     /// Its genes: inherited and mutated
     Evolved,

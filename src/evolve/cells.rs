@@ -202,3 +202,142 @@ pub fn sae(search: &mut dyn Search) -> Result<u64> {
 fn difference(one: Rgb, other: Rgb) -> u64 {
     one.iter().zip(other).map(|(&a, b)| u64::from(a.abs_diff(b))).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::model::cells::{Rules, SearchState, Stacks};
+    use crate::model::{Guide, GuideSample, MaskSet, Target};
+
+    /// A search of one white pixel whose objective falls by a share of itself each round, and that counts its calls.
+    struct Scripted {
+        course: Course,
+        standing: Standing,
+        evals_per_round: u64,
+        /// The objective loses a part in so many.
+        loss: i64,
+        calls: Vec<u32>,
+    }
+
+    impl Scripted {
+        fn new(evals_per_round: u64, loss: i64) -> Self {
+            let target = Target::new(1, 1, vec![[255; 3]]).expect("one pixel is 1x1");
+            let sample = GuideSample { direction: 0, coherence: 0, size_q12: 1 << 12 };
+            let course = Course {
+                rules: Rules::free(0, 64, 1, [0; 3]),
+                target: Arc::new(target),
+                guide: Arc::new(Guide { columns: 1, rows: 1, samples: vec![sample] }),
+                masks: Arc::new(MaskSet::default()),
+                fly_count: 1,
+            };
+            let standing = Standing { objective: 1_000_000, ..Standing::default() };
+            Self { course, standing, evals_per_round, loss, calls: Vec::new() }
+        }
+    }
+
+    impl Search for Scripted {
+        fn course(&self) -> &Course {
+            &self.course
+        }
+
+        fn load(&mut self, _flies: &[Fly]) -> Result<()> {
+            self.standing.objective = 500_000;
+            Ok(())
+        }
+
+        fn advance(&mut self, rounds: u32) -> Result<()> {
+            self.calls.push(rounds);
+            for _ in 0..rounds {
+                self.standing.rounds += 1;
+                self.standing.evals += self.evals_per_round;
+                self.standing.objective -= self.standing.objective / self.loss;
+            }
+            Ok(())
+        }
+
+        fn renormalise(&mut self) -> Result<()> {
+            self.calls.push(0);
+            Ok(())
+        }
+
+        fn standing(&self) -> Standing {
+            self.standing
+        }
+
+        fn read_back(&mut self) -> Result<SearchState> {
+            Ok(SearchState { flies: vec![Fly::ABSENT], steps: vec![0], fitness: vec![0] })
+        }
+
+        fn read_back_stacks(&mut self) -> Result<Stacks> {
+            Ok(Stacks { pixels: vec![vec![(0, 18)]] })
+        }
+    }
+
+    /// Looks at every round, and ends at the given one.
+    struct EndAt(u32);
+
+    impl Observer for EndAt {
+        fn looks_at_rounds(&self) -> bool {
+            true
+        }
+
+        fn after_epoch(&mut self, search: &mut dyn Search) -> Result<Option<StopReason>> {
+            Ok((search.standing().rounds >= self.0).then_some(StopReason::Time))
+        }
+    }
+
+    const ENDLESS: Budget = Budget { evals: u64::MAX, target_sae: None, patience: None };
+
+    fn run_until(search: &mut Scripted, budget: Budget) -> (StopReason, u32) {
+        let reason = run(search, None, &budget, &mut None::<EndAt>).expect("nothing fails");
+        (reason, search.standing.rounds)
+    }
+
+    #[test]
+    fn a_search_ends_after_the_epoch_in_which_a_budget_was_spent() {
+        let evals = |evals| run_until(&mut Scripted::new(10, 2), Budget { evals, ..ENDLESS });
+        assert_eq!([evals(0), evals(1), evals(40), evals(41)].map(|(_, rounds)| rounds), [0, 4, 4, 8]);
+        assert_eq!(evals(41).0, StopReason::Evals);
+        let reached = run_until(&mut Scripted::new(10, 2), Budget { target_sae: Some(100_000), ..ENDLESS });
+        assert_eq!(reached, (StopReason::TargetSae, 4));
+    }
+
+    #[test]
+    fn patience_ends_a_search_whose_objective_falls_by_less_than_a_thousandth() {
+        let budget = Budget { patience: Some(80), evals: 4_000, ..ENDLESS };
+        assert_eq!(run_until(&mut Scripted::new(10, 100_000), budget), (StopReason::Patience, 8));
+        assert_eq!(run_until(&mut Scripted::new(10, 1_000), budget), (StopReason::Evals, 400));
+    }
+
+    #[test]
+    fn a_search_that_makes_no_child_any_more_ends() {
+        assert_eq!(run_until(&mut Scripted::new(0, 2), ENDLESS), (StopReason::Dry, 4 * IDLE_EPOCHS_MAX));
+    }
+
+    #[test]
+    fn an_observer_of_rounds_sees_each_and_changes_nothing_but_the_number_of_submissions() {
+        let (mut watched, mut alone) = (Scripted::new(10, 7), Scripted::new(10, 7));
+        let reason = run(&mut watched, Some(&[Fly::ABSENT]), &ENDLESS, &mut EndAt(8)).expect("nothing fails");
+        assert_eq!(reason, StopReason::Time);
+        assert_eq!(watched.calls, [1, 1, 1, 1, 0, 1, 1, 1, 1, 0]);
+        alone.load(&[Fly::ABSENT]).expect("nothing fails");
+        run_until(&mut alone, Budget { evals: 80, ..ENDLESS });
+        assert_eq!((alone.calls, alone.standing), (vec![4, 0, 4, 0], watched.standing));
+    }
+
+    #[test]
+    fn the_sae_is_without_penalties_weights_and_what_is_transparent() {
+        let mut search = Scripted::new(10, 2);
+        assert_eq!(sae(&mut search).expect("nothing fails"), 1_000_000);
+        search.course.rules.penalties.overlap = 5;
+        assert!(!lowers_sae_alone(&search.course));
+        assert_eq!(sae(&mut search).expect("nothing fails"), 18);
+        let white = Target::new(2, 1, vec![[255; 3]; 2]).expect("two pixels");
+        search.course.target = Arc::new(white.clone().with_weights(vec![9, 1]).expect("two weights"));
+        assert_eq!(sae(&mut search).expect("nothing fails"), 2);
+        search.course.target = Arc::new(white.with_transparent(vec![true, false]).expect("two pixels"));
+        assert_eq!(sae(&mut search).expect("nothing fails"), 0);
+    }
+}

@@ -26,6 +26,17 @@ pub enum GuideKind {
     },
 }
 
+/// What lies behind all tiles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Ground {
+    /// Black, as in the paper.
+    Black,
+    /// The mean colour of the picture: a toned canvas.
+    Mean,
+    /// The grout, between tiles as around them.
+    Grout,
+}
+
 /// A share of the tiles that have a size of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ClassStyle {
@@ -50,6 +61,10 @@ pub struct Style {
     pub birth_min_q8: u32,
     /// Largest side of a newborn tile over its own, in 1/256.
     pub birth_max_q8: u32,
+    /// Whether the longer side of a newborn tile lies along the guide's direction, as a brush is drawn.
+    pub is_stroke: bool,
+    /// What lies behind the tiles unless a colour is asked for.
+    pub ground: Ground,
     /// Cost of each further tile on a pixel.
     pub overlap: u32,
     /// Cost of each pixel that no tile covers.
@@ -94,6 +109,8 @@ impl Style {
             aspect_max_q8: ASPECT_FREE_Q8,
             birth_min_q8: 20,
             birth_max_q8: 6 * ONE_Q8,
+            is_stroke: false,
+            ground: Ground::Black,
             overlap: 0,
             hole: 0,
             turn: 0,
@@ -115,6 +132,7 @@ impl Style {
             aspect_max_q8: ONE_Q8 * 16 / 10,
             birth_min_q8: ONE_Q8 * 7 / 10,
             birth_max_q8: ONE_Q8 * 14 / 10,
+            ground: Ground::Grout,
             overlap: 20,
             hole: 120,
             turn: 60,
@@ -135,7 +153,9 @@ impl Style {
             aspect_max_q8: ONE_Q8 * 6,
             birth_min_q8: ONE_Q8 * 5 / 10,
             birth_max_q8: ONE_Q8 * 3,
-            turn: 0,
+            is_stroke: true,
+            ground: Ground::Mean,
+            hole: 60,
             angle_spread: 65_536 / 40,
             coherence: 0,
             guide: GuideKind::Flow { smoothing_q8: ONE_Q8, size_strength_q8: 128 },
@@ -166,6 +186,7 @@ impl Style {
                 side_low: logarithm(self.birth_min_q8),
                 side_high: logarithm(self.birth_max_q8),
                 aspect_high: if self.aspect_max_q8 >= ASPECT_FREE_Q8 { 1_024 } else { logarithm(self.aspect_max_q8) },
+                is_stroke: u32::from(self.is_stroke),
                 angle_spread: self.angle_spread,
                 coherence_range: self.coherence,
                 ..base.births

@@ -8,7 +8,7 @@ use crate::model::cells::rules::{Acceptance, CLASSES_MAX, SEARCH_SIDE_MAX};
 use crate::model::cells::{Course, Rules, Stacks};
 use crate::model::fly::UNITS_PER_PX;
 use crate::model::tile::pack;
-use crate::model::{Fly, NO_FLY};
+use crate::model::{Blend, Fly, NO_FLY};
 
 /// Pixels of a block.
 const BLOCK_PIXELS: usize = (BLOCK_SIDE_PX * BLOCK_SIDE_PX) as usize;
@@ -82,13 +82,18 @@ fn side_max(rules: &Rules) -> u32 {
     let scale = classes.iter().map(|class| class.scale_q12).max().unwrap_or(1 << 12);
     let local = if rules.bounds.local_size == 0 { 1 } else { 4 };
     let own = (u64::from(rules.side) * u64::from(scale) * local) >> 12;
-    let side = own.min(u64::from(SEARCH_SIDE_MAX)) * u64::from(rules.bounds.side_max_q8) >> 8;
+    let side = (own.min(u64::from(SEARCH_SIDE_MAX)) * u64::from(rules.bounds.side_max_q8)) >> 8;
     side.min(u64::from(SEARCH_SIDE_MAX)) as u32
 }
 
 /// Refuses what would not fit the 32 bits of fitness and changes, or of indices.
 pub(super) fn check(course: &Course) -> Result<()> {
-    let Course { rules, target, .. } = course;
+    let Course { rules, target, masks, .. } = course;
+    if masks.blend() == Blend::Translucent {
+        return Err(Error::NoSuitableDevice {
+            why: "a Vulkan device does not search with translucent masks; use --device cpu".to_owned(),
+        });
+    }
     let side_px = u64::from(side_max(rules).div_ceil(UNITS_PER_PX)) + 2;
     let pixels = (side_px * side_px).min(u64::from(target.width_px()) * u64::from(target.height_px()));
     let penalties = &rules.penalties;

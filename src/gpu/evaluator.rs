@@ -10,7 +10,7 @@ use super::translucent_pass::TranslucentPass;
 use crate::error::Result;
 use crate::model::blocks::index_of;
 use crate::model::{Blend, Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
-use crate::vk::{Buffer, Device, Recorder, Timing};
+use crate::vk::{Buffer, Device, PassTime, Recorder, Timing};
 
 /// The evaluator of a Vulkan device.
 pub struct GpuEvaluator {
@@ -70,6 +70,22 @@ impl GpuEvaluator {
         let fitness = lanes.iter().map(|lane| Fitness { sae: 0, marginal: vec![0; lane.tiles().len()] }).collect();
         let work = Work::default();
         Ok(Self { device: Arc::clone(device), recorder, pass, translucent, lanes, fitness, work })
+    }
+
+    /// As [`GpuEvaluator::create`], with timestamps around each pass where the device has them.
+    ///
+    /// # Errors
+    /// If the device has no room for the scenes.
+    pub fn create_timed(device: &Arc<Device>, scenes: Vec<Scene>) -> Result<Self> {
+        let mut evaluator = Self::create(device, scenes)?;
+        evaluator.recorder = Recorder::create(device, "evaluator", Timing::On)?;
+        Ok(evaluator)
+    }
+
+    /// Times of the passes of the last submission; empty unless created with timestamps.
+    #[must_use]
+    pub fn pass_times(&self) -> &[PassTime] {
+        self.recorder.pass_times()
     }
 
     /// The fly that shows at each pixel as the graphics pass draws it, or [`crate::model::NO_FLY`].

@@ -170,10 +170,11 @@ fn the_pixels_that_are_evolved_towards_decide_too() {
 fn a_population_is_taken_up_where_it_was_left() {
     let workshop = Workshop::new();
     let first = workshop.evolve_to_row("-o a.png -o flies.npz --background white");
-    let again = workshop.run("evolve photo.png --init flies.npz --births 0 -o b.png --json").row();
+    let again = workshop.run("evolve photo.png --scheme paper --init flies.npz --births 0 -o b.png --json").row();
     assert_eq!([&again["sae"], &again["tiles"]], [&first["sae"], &first["tiles"]]);
     assert_eq!(workshop.pixels("a.png"), workshop.pixels("b.png"), "the background comes from the population");
-    let further = workshop.run("evolve photo.png --init flies.npz --births 500 --seed 1 -o c.png --json").row();
+    let further =
+        workshop.run("evolve photo.png --scheme paper --init flies.npz --births 500 --seed 1 -o c.png --json").row();
     assert!(further["sae"].as_u64() <= first["sae"].as_u64(), "the best is kept");
     assert_ne!(further["key"], again["key"]);
 }
@@ -198,7 +199,7 @@ fn budgets_end_an_evolution_and_are_named_as_the_reason() {
         ("--births 10M --on-dry stop", "dry"),
         ("--births 0", "births"),
     ] {
-        let ran = workshop.run(&format!("evolve photo.png -n 60 -o a.png --force --json {rest}"));
+        let ran = workshop.run(&format!("evolve photo.png --scheme paper -n 60 -o a.png --force --json {rest}"));
         assert_eq!(ran.code, Some(0), "{rest}: {}", ran.stderr);
         assert_eq!([&ran.row()["stop"], &ran.row()["status"]], [stop, "complete"], "{rest}");
     }
@@ -207,8 +208,9 @@ fn budgets_end_an_evolution_and_are_named_as_the_reason() {
 #[test]
 fn a_run_that_the_clock_cut_can_be_repeated_from_what_was_told() {
     let workshop = Workshop::new();
-    let row =
-        workshop.run("evolve photo.png -n 60 -o a.png --json --births 1000 --restarts 1000000 --time 300ms").row();
+    let row = workshop
+        .run("evolve photo.png --scheme paper -n 60 -o a.png --json --births 1000 --restarts 1000000 --time 300ms")
+        .row();
     assert_eq!(row["stop"], "time");
     let [births, restarts, last] =
         ["births", "restarts", "births_in_last_run"].map(|field| row[field].as_u64().unwrap());
@@ -245,7 +247,7 @@ fn a_reader_that_goes_away_needs_no_row_but_misses_a_picture() {
     for (output, code, message) in
         [("-o a.png --json", 0, ""), ("-o -", 1, "smalti: stdout: its reader went away before it had the picture")]
     {
-        let line = format!("evolve photo.png -n 60 --births 300 -q {output}");
+        let line = format!("evolve photo.png --scheme paper -n 60 --births 300 -q {output}");
         let mut child = workshop.command(&line).spawn().unwrap();
         drop(child.stdout.take());
         let output = child.wait_with_output().unwrap();
@@ -268,7 +270,8 @@ fn messages_off_a_terminal_have_no_escape_codes_and_quiet_has_no_messages() {
 #[test]
 fn progress_in_json_has_one_object_a_line() {
     let workshop = Workshop::new();
-    let ran = workshop.run("evolve photo.png -o a.png -n 60 --births 1000M --time 2500ms --progress json -q");
+    let ran =
+        workshop.run("evolve photo.png --scheme paper -o a.png -n 60 --births 1000M --time 2500ms --progress json -q");
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     let lines: Vec<Value> = ran.stderr.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     assert!(!lines.is_empty());

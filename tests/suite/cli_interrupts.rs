@@ -5,7 +5,7 @@ use std::process::{Child, Command, ExitStatus};
 
 use crate::workshop::Workshop;
 
-const ENDLESS: &str = "evolve photo.png -n 60 --births 1000000M --progress json";
+const ENDLESS: &str = "evolve photo.png --scheme paper -n 60 --births 1000000M --progress json";
 
 pub fn send(signal: &str, child: &Child) {
     let status = Command::new("sh").args(["-c", &format!("kill -{signal} {}", child.id())]).status().unwrap();

@@ -80,9 +80,9 @@ fn values_out_of_range_are_refused_with_their_flag() {
         ("--sed 1", "--seed"),
         ("-q -v", "--verbose"),
     ] {
-        refused(&workshop, &format!("evolve photo.png -o out.png {rest}"), 2, words);
+        refused(&workshop, &format!("evolve photo.png --scheme paper -o out.png {rest}"), 2, words);
     }
-    refused(&workshop, "evolve photo.png", 2, "--output");
+    refused(&workshop, "evolve photo.png --scheme paper", 2, "--output");
 }
 
 #[test]
@@ -91,14 +91,14 @@ fn a_device_that_is_not_there_is_no_suitable_device() {
     for device in
         ["name:no-such-gpu", "99", "99999999999999999999", "uuid:00000000000000000000000000000000", "pci:ffff:ff:1f.7"]
     {
-        refused(&workshop, &format!("evolve photo.png -o out.png --device {device}"), 4, device);
+        refused(&workshop, &format!("evolve photo.png --scheme paper -o out.png --device {device}"), 4, device);
     }
 }
 
 #[test]
 fn an_empty_variable_asks_for_no_device() {
     let workshop = Workshop::new();
-    let mut command = workshop.command("evolve photo.png -o out.png --dry-run");
+    let mut command = workshop.command("evolve photo.png --scheme paper -o out.png --dry-run");
     let output = command.env("SMALTI_DEVICE", "").output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
@@ -126,7 +126,7 @@ fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
         ("-o new.npz/.", 1, "new.npz/.: is a folder"),
         ("-o a.png --save-target new.png/", 1, "new.png/: is a folder"),
     ] {
-        refused(&workshop, &format!("evolve photo.png {outputs} {births}"), code, words);
+        refused(&workshop, &format!("evolve photo.png --scheme paper {outputs} {births}"), code, words);
     }
 }
 
@@ -135,7 +135,7 @@ fn outputs_that_cannot_be_or_make_no_sense_are_refused_before_the_work() {
 fn an_output_that_cannot_be_written_takes_no_other_with_it_and_the_row_lists_what_is_there() {
     let workshop = Workshop::new();
     std::os::unix::fs::symlink("/dev/full", workshop.path("full.png")).unwrap();
-    let line = "evolve photo.png -n 60 --births 100 -q --json -o a.npz -o full.png -o b.png --save-target t.png";
+    let line = "evolve photo.png --scheme paper -n 60 --births 100 -q --json -o a.npz -o full.png -o b.png --save-target t.png";
     let ran = workshop.run(line);
     assert_eq!(ran.code, Some(1), "{}", ran.stderr);
     assert!(ran.stderr.starts_with("smalti: full.png: the disk is full"), "{}", ran.stderr);
@@ -153,20 +153,20 @@ fn populations_that_do_not_fit_are_refused() {
     workshop.evolve("-o flies.npz");
     let npz = workshop.read("flies.npz");
     workshop.write("cut.npz", &npz[..npz.len() / 2]);
-    refused(&workshop, "evolve other.png -o a.png --init flies.npz", 2, "40x30");
-    refused(&workshop, "evolve photo.png -o a.png --init flies.npz --size 20", 2, "20x15");
-    refused(&workshop, "evolve photo.png -o a.png --init flies.npz -n 60", 2, "--tiles");
-    refused(&workshop, "evolve photo.png -o a.png --init photo.png", 2, "photo.png");
-    refused(&workshop, "evolve photo.png -o a.png --init missing.npz", 2, "missing.npz");
-    refused(&workshop, "evolve photo.png -o a.png --init cut.npz", 2, "cut.npz");
+    refused(&workshop, "evolve other.png --scheme paper -o a.png --init flies.npz", 2, "40x30");
+    refused(&workshop, "evolve photo.png --scheme paper -o a.png --init flies.npz --size 20", 2, "20x15");
+    refused(&workshop, "evolve photo.png --scheme paper -o a.png --init flies.npz -n 60", 2, "--tiles");
+    refused(&workshop, "evolve photo.png --scheme paper -o a.png --init photo.png", 2, "photo.png");
+    refused(&workshop, "evolve photo.png --scheme paper -o a.png --init missing.npz", 2, "missing.npz");
+    refused(&workshop, "evolve photo.png --scheme paper -o a.png --init cut.npz", 2, "cut.npz");
     std::fs::create_dir(workshop.path("folder")).unwrap();
-    refused(&workshop, "evolve photo.png -o a.png --init folder", 2, "folder: is a folder");
+    refused(&workshop, "evolve photo.png --scheme paper -o a.png --init folder", 2, "folder: is a folder");
 }
 
 #[test]
 fn only_force_replaces_what_the_same_command_would_not_have_written() {
     let workshop = Workshop::new();
-    let command = "evolve photo.png -n 60 --births 100";
+    let command = "evolve photo.png --scheme paper -n 60 --births 100";
     for ending in ["png", "jpg", "webp", "svg", "ora", "npz", "json"] {
         let name = format!("a.{ending}");
         workshop.write(&name, b"written by somebody else");
@@ -189,8 +189,8 @@ fn a_saved_target_is_replaced_whatever_evolved_towards_it() {
     let workshop = Workshop::new();
     workshop.evolve("-o a.png --save-target t.png");
     workshop.evolve("-o b.png --save-target t.png --seed 1");
-    refused(&workshop, "evolve photo.png -o c.png --save-target t.png --size 20", 2, "t.png exists");
-    refused(&workshop, "evolve photo.png -o c.png --save-target a.png", 2, "a.png exists");
+    refused(&workshop, "evolve photo.png --scheme paper -o c.png --save-target t.png --size 20", 2, "t.png exists");
+    refused(&workshop, "evolve photo.png --scheme paper -o c.png --save-target a.png", 2, "a.png exists");
 }
 
 #[cfg(target_os = "linux")]
@@ -201,7 +201,7 @@ fn a_picture_for_a_closed_stdout_is_refused_before_the_work_and_the_null_device_
         [(">&-", "1000M", 1, "smalti: stdout: is closed"), ("> /dev/null", "100", 0, "")]
     {
         let line = format!(
-            "exec {} evolve photo.png -q -n 60 --births {births} -o - {redirection}",
+            "exec {} evolve photo.png --scheme paper -q -n 60 --births {births} -o - {redirection}",
             env!("CARGO_BIN_EXE_smalti")
         );
         let mut command = std::process::Command::new("sh");
@@ -218,7 +218,7 @@ fn a_picture_for_a_closed_stdout_is_refused_before_the_work_and_the_null_device_
 fn a_row_that_cannot_be_printed_is_a_failure_with_a_sentence() {
     let workshop = Workshop::new();
     let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
-    let mut command = workshop.command("evolve photo.png -n 60 --births 100 -q --json -o a.png");
+    let mut command = workshop.command("evolve photo.png --scheme paper -n 60 --births 100 -q --json -o a.png");
     let output = command.stdout(full).output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{stderr}");
@@ -229,7 +229,7 @@ fn a_row_that_cannot_be_printed_is_a_failure_with_a_sentence() {
 fn a_map_of_weights_is_refused_where_the_scheme_has_no_use_for_it() {
     let workshop = Workshop::new();
     let words = "--weight: the paper's scheme weighs all pixels alike; use --scheme cells";
-    refused(&workshop, "evolve photo.png -o a.png --weight photo.png", 2, words);
+    refused(&workshop, "evolve photo.png --scheme paper -o a.png --weight photo.png", 2, words);
     refused(&workshop, "evolve photo.png -o a.png --scheme paper --weight missing.png", 2, words);
 }
 

@@ -42,7 +42,7 @@ fn numbers(line: &str) -> Vec<f64> {
 #[test]
 fn a_curve_has_its_start_its_end_its_restarts_and_nothing_of_the_clock() {
     let workshop = Workshop::new();
-    let line = "evolve photo.png -n 60 --births 1k --restarts 2 -o out.png --curve curve.csv --curve curve.svg --json";
+    let line = "evolve photo.png --scheme paper -n 60 --births 1k --restarts 2 -o out.png --curve curve.csv --curve curve.svg --json";
     let row = workshop.run(&format!("{line} --threads 1")).row();
     let (csv, svg) = (workshop.read("curve.csv"), workshop.read("curve.svg"));
     let text = String::from_utf8(csv.clone()).unwrap();
@@ -91,7 +91,7 @@ fn a_curve_replaces_only_a_curve_of_the_same_command_unless_forced() {
         ("drawing.svg", "not made by smalti"),
     ] {
         let before = workshop.read(name);
-        let line = format!("evolve photo.png -n 60 --births 300 --seed 5 -o other.png --curve {name}");
+        let line = format!("evolve photo.png --scheme paper -n 60 --births 300 --seed 5 -o other.png --curve {name}");
         let ran = workshop.run(&line);
         assert_eq!(ran.code, Some(2), "{name}: {}", ran.stderr);
         assert!(ran.stderr.contains(name) && ran.stderr.contains(why), "{name}: {}", ran.stderr);
@@ -137,7 +137,7 @@ fn values_of_the_scheme_out_of_range_are_refused_with_their_flag() {
         ("--curve a.csv --curve ./a.csv", "named twice", 2),
         ("--curve missing/a.csv", "missing/a.csv", 1),
     ] {
-        let ran = workshop.run(&format!("evolve photo.png -o out.png {rest}"));
+        let ran = workshop.run(&format!("evolve photo.png --scheme paper -o out.png {rest}"));
         assert_eq!(ran.code, Some(code), "{rest}: {}", ran.stderr);
         let sentence = ran.stderr.strip_prefix("smalti: ").unwrap_or_else(|| panic!("{rest}: {:?}", ran.stderr));
         assert!(sentence.lines().count() == 1 && sentence.contains(words), "{rest}: {sentence}");
@@ -160,7 +160,7 @@ fn a_target_that_is_reached_before_the_last_change_of_masks_or_split_ends_only_t
 #[test]
 fn a_cut_before_the_last_split_or_change_of_masks_is_told() {
     let workshop = Workshop::new();
-    let line = "evolve photo.png -n 60 --births 1000M --time 200ms -o a.png --force --json";
+    let line = "evolve photo.png --scheme paper -n 60 --births 1000M --time 200ms -o a.png --force --json";
     let ran = workshop.run(&format!("{line} --mitosis 2 --restarts 2"));
     assert_eq!([&ran.row()["tiles"], &ran.row()["living"]], [60, 15]);
     let told = "stopped by time before the last split or change of masks, with 15 tiles alive";

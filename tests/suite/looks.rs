@@ -108,7 +108,7 @@ fn looks_that_make_no_sense_are_refused_in_one_sentence() {
         ("--palette words.hex", "line 2"),
         ("--palette missing.gpl", "no such file"),
     ] {
-        let ran = workshop.run(&format!("evolve photo.png -o x.png {flags}"));
+        let ran = workshop.run(&format!("evolve photo.png --scheme paper -o x.png {flags}"));
         assert_eq!(ran.code, Some(2), "{flags}: {}", ran.stderr);
         assert!(ran.stderr.contains(told) && ran.stderr.lines().count() == 1, "{flags}: {}", ran.stderr);
         assert!(!workshop.files().contains("x.png"), "{flags}");
@@ -126,7 +126,8 @@ fn worn(workshop: &Workshop, name: &str) -> (BTreeSet<u16>, usize) {
 fn a_population_keeps_its_masks_until_it_is_told_to_change() {
     let workshop = Workshop::new();
     workshop.evolve("--mask disc -o disc.npz");
-    let go_on = |flags: &str| workshop.run(&format!("evolve photo.png --init disc.npz --births 40 {flags}"));
+    let go_on =
+        |flags: &str| workshop.run(&format!("evolve photo.png --scheme paper --init disc.npz --births 40 {flags}"));
     assert_eq!(go_on("-o kept.npz").code, Some(0));
     assert_eq!(worn(&workshop, "kept.npz"), (BTreeSet::from([1]), 2));
     let later = "--restarts 1 --restart-mask flower,square";

@@ -3,9 +3,12 @@
 #![allow(missing_docs, reason = "test names are sentences; only code that others call needs docs")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test that it is in")]
 
+mod bench;
 mod canary;
+mod cells;
 mod cells_vulkan;
 mod cli;
+mod cli_cells;
 mod cli_interrupts;
 mod cli_refusals;
 mod cli_scheme;

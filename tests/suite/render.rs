@@ -76,7 +76,7 @@ fn every_format_has_the_size_that_was_asked_for() {
 fn another_background_shows_where_no_tile_is_and_only_there() {
     let workshop = Workshop::new();
     // Hardly any tiles, so that much of the background shows.
-    let evolve = "evolve photo.png -n 3 --births 0 -o flies.npz -o blue.png --background 0000ff";
+    let evolve = "evolve photo.png --scheme paper -n 3 --births 0 -o flies.npz -o blue.png --background 0000ff";
     assert_eq!(workshop.run(evolve).code, Some(0));
     render(&workshop, "-o white.png --background white");
     let (blue, white) = (workshop.pixels("blue.png"), workshop.pixels("white.png"));
@@ -210,7 +210,12 @@ fn a_csv_table_of_another_command_is_refused_before_the_work_unless_forced() {
     workshop.evolve("-o a.csv --background 336699");
     assert_eq!(workshop.read("a.csv"), first);
     refused(&workshop, "render flies.npz -o a.csv", 2, "a.csv exists and was made with other options");
-    refused(&workshop, "evolve photo.png --births 1000M -o a.csv", 2, "a.csv exists and was made with other options");
+    refused(
+        &workshop,
+        "evolve photo.png --scheme paper --births 1000M -o a.csv",
+        2,
+        "a.csv exists and was made with other options",
+    );
     workshop.evolve("-o a.csv --seed 1 --force");
     assert_ne!(workshop.read("a.csv"), first);
     render(&workshop, "-o drawn.csv");
@@ -218,7 +223,12 @@ fn a_csv_table_of_another_command_is_refused_before_the_work_unless_forced() {
 
     workshop.write("c.csv", b"x,y\n1,2\n");
     refused(&workshop, "render flies.npz -o c.csv", 2, "c.csv exists and was not made by smalti");
-    refused(&workshop, "evolve photo.png --births 1000M -o c.csv", 2, "c.csv exists and was not made by smalti");
+    refused(
+        &workshop,
+        "evolve photo.png --scheme paper --births 1000M -o c.csv",
+        2,
+        "c.csv exists and was not made by smalti",
+    );
 }
 
 #[test]

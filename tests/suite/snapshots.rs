@@ -51,7 +51,8 @@ fn a_snapshot_is_a_population_to_go_on_from_with_the_error_that_it_tells() {
     let workshop = Workshop::new();
     workshop.evolve("-o a.png --save-run run --save-every 100");
     let told = archive::read(&workshop.path("run/000000000100.npz")).unwrap().meta;
-    let again = workshop.run("evolve photo.png --init run/000000000100.npz --births 0 -o b.png --json").row();
+    let again =
+        workshop.run("evolve photo.png --scheme paper --init run/000000000100.npz --births 0 -o b.png --json").row();
     assert_eq!(again["sae"], told["sae"]);
 }
 
@@ -59,7 +60,7 @@ fn a_snapshot_is_a_population_to_go_on_from_with_the_error_that_it_tells() {
 fn the_end_of_a_run_that_was_cut_short_is_kept_too() {
     let workshop = Workshop::new();
     let rest = "--births 10M --patience 50 --restarts 1 --save-run run --save-every 1M";
-    let ran = workshop.run(&format!("evolve photo.png -n 60 -o a.png --json {rest}"));
+    let ran = workshop.run(&format!("evolve photo.png --scheme paper -n 60 -o a.png --json {rest}"));
     let count = |field: &str| ran.row()[field].as_u64().unwrap();
     let snapshots = snapshots_in(&workshop, "run");
     let end_of_first = count("births") - count("births_in_last_run");
@@ -88,7 +89,7 @@ fn the_same_command_may_write_its_folder_again_and_another_may_not() {
     workshop.evolve("-o a.png --save-run run");
     assert!(files_in(&workshop, "run") == before);
 
-    let other = "evolve photo.png -n 60 --births 200 -o b.png --seed 1 --save-run run";
+    let other = "evolve photo.png --scheme paper -n 60 --births 200 -o b.png --seed 1 --save-run run";
     let ran = workshop.run(other);
     assert_eq!(ran.code, Some(2));
     assert_eq!(
@@ -115,7 +116,8 @@ fn a_folder_of_other_files_or_a_file_is_refused_and_a_missing_folder_is_made() {
     for (folder, code, words) in
         [("photos", 2, "photos holds files that are no snapshots"), ("notes", 1, "notes: cannot be used as a folder")]
     {
-        let ran = workshop.run(&format!("evolve photo.png -n 60 --births 300 -o a.png --save-run {folder}"));
+        let ran =
+            workshop.run(&format!("evolve photo.png --scheme paper -n 60 --births 300 -o a.png --save-run {folder}"));
         assert_eq!(ran.code, Some(code), "{}", ran.stderr);
         assert!(ran.stderr.contains(words) && ran.stderr.lines().count() == 1, "{}", ran.stderr);
     }
@@ -130,7 +132,7 @@ fn a_folder_of_other_files_or_a_file_is_refused_and_a_missing_folder_is_made() {
 #[test]
 fn an_interrupt_leaves_whole_snapshots_up_to_where_it_came() {
     let workshop = Workshop::new();
-    let endless = "evolve photo.png -n 60 --births 1000000M --progress json -o a.npz --save-run run --save-every 500";
+    let endless = "evolve photo.png --scheme paper -n 60 --births 1000000M --progress json -o a.npz --save-run run --save-every 500";
     let (status, messages) = interrupted(&workshop, endless, &["INT"]);
     assert_eq!(status.code(), Some(75), "{messages}");
     let snapshots = snapshots_in(&workshop, "run");
@@ -149,7 +151,7 @@ fn a_folder_that_is_the_input_or_another_output_is_refused() {
         ("-o a.png --curve c.svg --save-run c.svg", "c.svg is named twice"),
         ("-o a.png --save-run ./photo.png", "./photo.png is an input"),
     ] {
-        refused(&workshop, &format!("evolve photo.png {rest}"), 2, words);
+        refused(&workshop, &format!("evolve photo.png --scheme paper {rest}"), 2, words);
     }
 }
 
@@ -158,7 +160,7 @@ fn a_folder_that_is_the_input_or_another_output_is_refused() {
 #[test]
 fn on_a_full_disk_new_snapshots_make_room_for_the_result() {
     let workshop = Workshop::new();
-    let line = "evolve photo.png -n 60 --births 300 -o a.png --save-run run --save-every 100 --force";
+    let line = "evolve photo.png --scheme paper -n 60 --births 300 -o a.png --save-run run --save-every 100 --force";
     std::fs::create_dir(workshop.path("run")).unwrap();
     std::os::unix::fs::symlink("/dev/full", workshop.path("run/000000000200.npz")).unwrap();
     workshop.write("run/notes.txt", b"mine");

@@ -98,7 +98,7 @@ fn a_gif_has_the_same_frames_in_few_colours_at_the_right_times() {
 #[test]
 fn a_gif_of_many_colours_comes_near_to_all_of_them() {
     let workshop = Workshop::new();
-    workshop.run("evolve photo.png -n 2000 --births 400 -o m.png --save-run run --save-every 200");
+    workshop.run("evolve photo.png --scheme paper -n 2000 --births 400 -o m.png --save-run run --save-every 200");
     timelapse(&workshop, "-o a.gif -o a.png --output-size 200");
     let (gif, png) = (gif_frames(workshop.read("a.gif")), apng_frames(workshop.read("a.png")));
     assert_eq!(gif.len(), png.len());
@@ -157,7 +157,7 @@ fn fewer_frames_keep_the_first_and_the_last_snapshot() {
 #[test]
 fn the_background_may_be_another_one() {
     let workshop = Workshop::new();
-    workshop.run("evolve photo.png -n 3 --births 50 -o m.png --save-run run");
+    workshop.run("evolve photo.png --scheme paper -n 3 --births 50 -o m.png --save-run run");
     timelapse(&workshop, "-o a.png");
     timelapse(&workshop, "-o b.png --background 336699");
     let count = |name: &str, color: [u8; 3]| {

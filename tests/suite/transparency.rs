@@ -135,7 +135,7 @@ fn translucent_tiles_over_nothing_are_over_any_colour_what_they_are_when_drawn_o
 /// A folder with `flies.npz`, transparent with few tiles, and the population in it.
 fn workshop() -> (Workshop, Population) {
     let workshop = Workshop::new();
-    let line = "evolve photo.png -n 9 --births 20 -o flies.npz --background white";
+    let line = "evolve photo.png --scheme paper -n 9 --births 20 -o flies.npz --background white";
     assert_eq!(workshop.run(line).code, Some(0));
     let Archive { mut population, fitness, meta } = archive::read(&workshop.path("flies.npz")).unwrap();
     population.background = Backdrop::Transparent;

@@ -197,10 +197,10 @@ fn without_vulkan_auto_takes_the_cpu_and_the_list_of_devices_says_so() {
     let workshop = Workshop::new();
     let nowhere = workshop.path("missing");
     let run = |line: &str| workshop.command(line).env("VK_DRIVER_FILES", &nowhere).output().expect("it starts");
-    let evolved = run("evolve photo.png -o out.png -n 60 --births 10 --device auto");
+    let evolved = run("evolve photo.png --scheme paper -o out.png -n 60 --births 10 --device auto");
     let note = String::from_utf8_lossy(&evolved.stderr);
     assert!(evolved.status.success() && note.contains("since no Vulkan driver is installed"), "{note}");
-    assert_eq!(run("evolve photo.png -o new.png --device vulkan").status.code(), Some(4));
+    assert_eq!(run("evolve photo.png --scheme paper -o new.png --device vulkan").status.code(), Some(4));
 
     let listed = run("devices --json");
     let list: serde_json::Value = serde_json::from_slice(&listed.stdout).expect("it is JSON");

@@ -70,9 +70,9 @@ impl Workshop {
         Ran { code: output.status.code(), stdout: output.stdout, stderr }
     }
 
-    /// Runs `evolve photo.png` with small settings and fails unless it succeeds.
+    /// Runs `evolve photo.png` by the paper's scheme with small settings and fails unless it succeeds.
     pub fn evolve(&self, rest: &str) -> Ran {
-        let ran = self.run(&format!("evolve photo.png -n 60 --births 300 {rest}"));
+        let ran = self.run(&format!("evolve photo.png --scheme paper -n 60 --births 300 {rest}"));
         assert_eq!(ran.code, Some(0), "{rest}: {}", ran.stderr);
         ran
     }

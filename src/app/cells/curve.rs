@@ -22,6 +22,16 @@ struct Point {
     spread: Spread,
 }
 
+impl Point {
+    fn sae(&self) -> f64 {
+        self.sae as f64
+    }
+
+    fn objective(&self) -> f64 {
+        self.standing.objective as f64
+    }
+}
+
 /// Records a search at its start and end and after every round, or after every k-th of more than 500 evals.
 #[derive(Clone, Debug)]
 pub(super) struct SearchCurve {
@@ -104,13 +114,11 @@ impl Tabled for SearchCurve {
             label: label.to_owned(),
             points: self.points.iter().map(|point| (point.standing.evals as f64, value(point))).collect(),
         };
-        let (sae, objective): (fn(&Point) -> f64, fn(&Point) -> f64) =
-            (|point| point.sae as f64, |point| point.standing.objective as f64);
-        let mut series = vec![line("SAE", sae)];
-        if self.points.iter().any(|point| sae(point) != objective(point)) {
-            series.push(line("objective", objective));
+        let mut series = vec![line("SAE", Point::sae)];
+        if self.points.iter().any(|point| point.sae() != point.objective()) {
+            series.push(line("objective", Point::objective));
         }
-        let values = self.points.iter().flat_map(|point| [sae(point), objective(point)]);
+        let values = self.points.iter().flat_map(|point| [point.sae(), point.objective()]);
         Plot {
             title,
             x_label: "evals".to_owned(),

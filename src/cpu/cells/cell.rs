@@ -3,20 +3,18 @@
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
 use super::area::{self, Area, Child, Cover, Exchanged, Shown};
-use super::block::{Block, Entry};
 use super::dressed::{self, DressedShown};
-use multiversion::multiversion;
-
+use super::exchange::{Exchange, add, exchange};
 use crate::model::cells::color::mean;
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::operators::{self, Setting, slot};
-use crate::model::cells::pixel::{STACK_DEPTH, difference};
+use crate::model::cells::pixel::STACK_DEPTH;
 use crate::model::cells::random::{Chain, below};
 use crate::model::cells::rules::{Acceptance, BirthKind, ColorSource, STEP_FIRST, grown, shrunk};
 use crate::model::cells::suit::Suit;
-use crate::model::cells::{Course, Grid, NO_CELL};
+use crate::model::cells::{Course, Grid};
 use crate::model::tile::{pack, unpack};
-use crate::model::{Fly, GuideSample, NO_FLY};
+use crate::model::{Fly, GuideSample};
 
 /// What all cells of a round share.
 pub struct Shared<'a> {
@@ -394,103 +392,4 @@ enum Paint {
     Anew,
     /// It takes one, and must show somewhere.
     Birth,
-}
-
-/// What the top fly of a pixel gains there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Excess {
-    fly: u32,
-    gain: i64,
-}
-
-impl Excess {
-    #[inline(always)]
-    fn of(block: &Block, pixel: usize) -> Self {
-        let gain = i64::from(block.under.error[pixel]) - i64::from(block.top.error[pixel]);
-        Self { fly: block.top.fly[pixel], gain }
-    }
-
-    /// Takes this off its fly's fitness and adds another one to its own.
-    #[inline(always)]
-    fn replace(self, new: Self, shared: &Shared<'_>, cell: u32) {
-        if self == new {
-            return;
-        }
-        if self.fly == new.fly {
-            if self.fly != NO_FLY {
-                add(shared, cell, self.fly, new.gain - self.gain);
-            }
-            return;
-        }
-        if self.fly != NO_FLY {
-            add(shared, cell, self.fly, -self.gain);
-        }
-        if new.fly != NO_FLY {
-            add(shared, cell, new.fly, new.gain);
-        }
-    }
-}
-
-/// Adds to a fly's marginal fitness: plainly to one of the cell's own, atomically to a frozen one.
-#[inline]
-fn add(shared: &Shared<'_>, cell: u32, fly: u32, amount: i64) {
-    let fitness = &shared.fitness[fly as usize];
-    if shared.owners[fly as usize] == cell && cell != NO_CELL {
-        fitness.store(fitness.load(Ordering::Relaxed) + amount, Ordering::Relaxed);
-    } else {
-        fitness.fetch_add(amount, Ordering::Relaxed);
-    }
-}
-
-/// One fly's change of place, depth or colour.
-struct Exchange<'a> {
-    shared: &'a Shared<'a>,
-    cell: u32,
-    fly: u32,
-    /// Its new colour.
-    color: u32,
-    keeps_depth: bool,
-    keeps_color: bool,
-}
-
-/// Takes a fly off the pixels of one tile and puts it on those of another.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
-fn exchange(area: &mut Area<'_>, [old, new]: &[Cover<'_>; 2], change: &Exchange<'_>) {
-    let Exchange { shared, cell, fly, color, keeps_depth, keeps_color } = *change;
-    let depth_of = |fly: u32| shared.depths[fly as usize].load(Ordering::Relaxed);
-    let own_z = depth_of(fly);
-    let is_behind = |other: u32| (own_z, fly) < (depth_of(other), other);
-    let error_at = |block: &Block, at: &Exchanged| {
-        let (target, weight) = (block.target[at.pixel], block.weight[at.pixel]);
-        let Some(suit) = new.suit else { return difference(target, color) * weight };
-        let (u, v) = new.footprint.coordinates(at.x, at.y);
-        suit.look(new.footprint, u as u32, v as u32).map_or(0, |look| suit.error(look, color, (target, weight)))
-    };
-    let mut covered = 0;
-    area.exchange(old, new, |block, at| {
-        let &Exchanged { pixel, was, is, .. } = at;
-        if was && is && keeps_depth && keeps_color {
-            return;
-        }
-        let before = Excess::of(block, pixel);
-        let entry = Entry { fly, error: if is { error_at(block, at) } else { 0 } };
-        let mut place = usize::MAX;
-        if was && is && keeps_depth {
-            place = block.recolor(pixel, entry);
-        } else {
-            if was {
-                place = block.remove(pixel, fly);
-                covered -= 1;
-            }
-            if is {
-                place = place.min(block.insert(pixel, entry, is_behind));
-                covered += 1;
-            }
-        }
-        if place < 2 {
-            block.surface(pixel, |fly| depth_of(fly) as i32);
-            before.replace(Excess::of(block, pixel), shared, cell);
-        }
-    });
-    add(shared, cell, fly, -covered * i64::from(shared.course.rules.penalties.overlap));
 }

@@ -4,6 +4,7 @@ mod area;
 mod block;
 mod cell;
 mod dressed;
+mod exchange;
 
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
@@ -20,7 +21,7 @@ use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
 use crate::model::cells::pixel::{BACKGROUND_Z, INSIDE, TRANSPARENT, difference};
 use crate::model::cells::random::{Chain, Draw};
 use crate::model::cells::rules::STEP_FIRST;
-use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, operators};
+use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, depths, operators};
 use crate::model::cells::{Grid, NO_CELL};
 use crate::model::fly::Z_MAX;
 use crate::model::tile::pack;
@@ -265,12 +266,9 @@ impl Search for CpuSearch {
     }
 
     fn renormalise(&mut self) -> Result<()> {
-        let order = depth_order(&self.flies);
-        let count = order.len() as u64;
-        for (rank, key) in (0_u64..).zip(order) {
-            let index = index_of(key) as usize;
-            self.flies[index].z = ((2 * rank + 1) * (u64::from(Z_MAX) + 1) / (2 * count)) as u32;
-            self.depths[index].store(self.flies[index].z, Ordering::Relaxed);
+        depths::spread(&mut self.flies);
+        for (depth, fly) in self.depths.iter().zip(&self.flies) {
+            depth.store(fly.z, Ordering::Relaxed);
         }
         let depths = &self.depths;
         self.blocks.par_iter_mut().for_each(|block| {

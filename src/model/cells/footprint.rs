@@ -94,3 +94,50 @@ fn half_extent(along: i32, across: i32, w: u32, h: u32) -> i32 {
     let sum = along.unsigned_abs() * w + across.unsigned_abs() * h;
     ((sum >> 13) + (sum >> 23) + 2) as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::rng::{Purpose, Stream};
+    use crate::model::{Canvas, Tile};
+
+    #[test]
+    fn a_footprint_is_the_tile_that_is_drawn() {
+        let mut stream = Stream::new(3, Purpose::FirstPopulation, 7, 7);
+        for _ in 0..20_000 {
+            let (width_px, height_px) = (1 + stream.below(300), 1 + stream.below(300));
+            let side = |stream: &mut Stream| {
+                let bits = 4 + stream.below(12);
+                16 + stream.below(1 << bits)
+            };
+            let fly = Fly {
+                x: stream.below((width_px - 1) * 64 + 1) as i32,
+                y: stream.below((height_px - 1) * 64 + 1) as i32,
+                angle: stream.bits() as u16,
+                w: side(&mut stream),
+                h: side(&mut stream),
+                alive: true,
+                ..Fly::ABSENT
+            };
+            let tile = Tile::bake(&fly, &Canvas::evaluation(width_px, height_px));
+            let footprint = Footprint::of(&fly, (width_px, height_px));
+            if tile.is_empty() {
+                assert!(footprint.is_empty(), "{fly:?}");
+                continue;
+            }
+            let expected = Footprint {
+                x0: tile.x0,
+                y0: tile.y0,
+                x1: tile.x1,
+                y1: tile.y1,
+                u0: tile.u0,
+                v0: tile.v0,
+                cos: tile.cos,
+                sin: tile.sin,
+                u_end: tile.u_end() as i32,
+                v_end: tile.v_end() as i32,
+            };
+            assert_eq!(footprint, expected, "{fly:?} in {width_px}x{height_px} px");
+        }
+    }
+}

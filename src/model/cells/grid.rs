@@ -106,3 +106,51 @@ impl Grid {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Fly;
+
+    #[test]
+    fn the_cells_of_every_round_tile_the_picture_and_hold_their_own_pixels() {
+        for (size_px, side_px) in [((200, 90), 64), ((7, 300), 128), ((64, 64), 64), ((1, 1), 64)] {
+            for round in 0..40 {
+                let grid = Grid::new(5, round, size_px, side_px);
+                let mut area = 0;
+                for cell in 0..grid.cell_count() {
+                    let [x0, y0, x1, y1] = grid.bounds(cell);
+                    assert!(x0 < x1 && y0 < y1 && x0 % BLOCK_SIDE_PX == 0 && y0 % BLOCK_SIDE_PX == 0, "{grid:?}");
+                    assert!(x1 - x0 <= side_px && y1 - y0 <= side_px);
+                    for (x, y) in [(x0, y0), (x1 - 1, y0), (x0, y1 - 1), (x1 - 1, y1 - 1)] {
+                        assert_eq!(grid.cell_at(x, y), cell, "{grid:?} at {x}, {y}");
+                    }
+                    area += (x1 - x0) * (y1 - y0);
+                }
+                assert_eq!(area, size_px.0 * size_px.1, "{grid:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_fly_belongs_to_a_cell_only_with_its_whole_box() {
+        let grid = Grid { offset_x: 0, offset_y: 0, columns: 2, rows: 2, ..Grid::new(0, 0, (128, 128), 64) };
+        let at = |x: i32, side: u32| {
+            let fly = Fly { x: x * 64, y: 20 * 64, w: side * 64, h: side * 64, alive: true, ..Fly::ABSENT };
+            grid.cell_of(&Footprint::of(&fly, (128, 128)))
+        };
+        assert_eq!([at(30, 10), at(90, 10), at(62, 10)], [0, 1, NO_CELL]);
+        assert_eq!(at(2, 30), 0, "what hangs over the border does not count");
+        assert_eq!(grid.cell_of(&Footprint::EMPTY), NO_CELL);
+    }
+
+    #[test]
+    fn a_cell_is_eleven_tiles_wide_or_more_and_offsets_differ_from_round_to_round() {
+        assert_eq!([64, 5 * 64, 6 * 64, 12 * 64, 500 * 64].map(cell_side_px), [64, 64, 128, 256, 8_192]);
+        let offsets: std::collections::BTreeSet<_> = (0..50)
+            .map(|round| Grid::new(0, round, (512, 512), 64))
+            .map(|grid| (grid.offset_x, grid.offset_y))
+            .collect();
+        assert!(offsets.len() > 25, "only {} offsets", offsets.len());
+    }
+}

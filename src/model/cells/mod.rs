@@ -5,6 +5,7 @@
 //! ([`color`]) and what they cost ([`pixel`], [`Penalties`]). Who goes through the steps is for an evaluator to say.
 
 pub mod color;
+pub mod depths;
 pub mod footprint;
 pub mod grid;
 pub mod operators;

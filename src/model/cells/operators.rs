@@ -163,6 +163,7 @@ pub fn newborn(setting: &Setting<'_>, (x, y): (u32, u32), shown_z: u32, local: G
     let log_w = births.side_low + draws.below(slot::OPERATOR, range) as i32;
     let log_h = births.side_low + draws.below(slot::OPERATOR + 1, range) as i32;
     let log_h = log_h.clamp(log_w - births.aspect_high, log_w + births.aspect_high);
+    let (log_w, log_h) = if births.is_stroke == 0 { (log_w, log_h) } else { (log_w.max(log_h), log_w.min(log_h)) };
     let bits = draws.bits(slot::OPERATOR + 2);
     let follows = u32::from(local.coherence) >= below(bits << 16, births.coherence_range + 1);
     let around = (births.angle_spread as i32 * bell_q8(draws, slot::OPERATOR + 3) + 128) >> 8;
@@ -210,4 +211,148 @@ pub fn turn_penalty(fly: &Fly, rules: &Rules, local: GuideSample) -> i64 {
     let squared = deviation.wrapping_mul(deviation) >> 18;
     let area = (fly.w >> 4) * (fly.h >> 4);
     i64::from(((area * squared) >> 12) * rules.penalties.turn)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::Draw;
+    use super::super::rules::{BirthKind, STEP_MAX, STEP_MIN};
+    use super::*;
+
+    const SIZE_PX: (u32, u32) = (300, 200);
+
+    fn draws(number: u32) -> Chain {
+        Chain::new(9, 0, Draw::Step).then(number)
+    }
+
+    fn fly(angle: u16) -> Fly {
+        Fly { x: 150 * 64, y: 100 * 64, z: 1 << 22, w: 640, h: 480, angle, alive: true, ..Fly::ABSENT }
+    }
+
+    fn rules() -> Rules {
+        Rules::free(0, 512, 300, [0; 3])
+    }
+
+    fn setting(rules: &Rules) -> Setting<'_> {
+        Setting { rules, own_side: rules.side, size_px: SIZE_PX }
+    }
+
+    /// Middles of the four edges in 1/64 px: right, left, bottom, top.
+    fn edges(fly: &Fly) -> [(f64, f64); 4] {
+        let (cos, sin) = cos_sin(fly.angle);
+        let (cos, sin) = (f64::from(cos) / 4096.0, f64::from(sin) / 4096.0);
+        let (w, h) = (f64::from(fly.w) / 2.0, f64::from(fly.h) / 2.0);
+        [(w * cos, w * sin), (-w * cos, -w * sin), (-h * sin, h * cos), (h * sin, -h * cos)]
+            .map(|(dx, dy)| (f64::from(fly.x) + dx, f64::from(fly.y) + dy))
+    }
+
+    #[test]
+    fn moving_an_edge_leaves_the_opposite_edge_where_it_is() {
+        let rules = rules();
+        let mut moved = [0; 4];
+        for number in 0..2_000 {
+            let parent = fly((number * 97) as u16);
+            let child = edge_moved(&parent, &setting(&rules), STEP_MAX, draws(number));
+            let distances: Vec<f64> =
+                edges(&parent).iter().zip(edges(&child)).map(|(a, b)| (a.0 - b.0).hypot(a.1 - b.1)).collect();
+            let fixed = (0..4).filter(|&edge| distances[edge] < 1.0).count();
+            assert!(fixed >= 1, "no edge of {child:?} is where it was: {distances:?}");
+            let most = (0..4).max_by(|&a, &b| distances[a].total_cmp(&distances[b])).unwrap_or(0);
+            moved[most] += 1;
+        }
+        assert!(moved.iter().all(|&count| count > 300), "each edge is moved as often as the others: {moved:?}");
+    }
+
+    #[test]
+    fn smaller_steps_make_smaller_changes() {
+        let rules = rules();
+        let spread = |step: u32| {
+            let of = |number| {
+                let (parent, setting) = (fly(0), setting(&rules));
+                let edge = edge_moved(&parent, &setting, step, draws(number));
+                let shift = shifted(&parent, &setting, step, draws(number));
+                let turn = turned(&parent, step, draws(number)).angle as i16;
+                let depth = raised(&parent, step, draws(number)).z.abs_diff(parent.z);
+                let sides = u64::from(edge.w.abs_diff(640) + edge.h.abs_diff(480) + shift.w.abs_diff(640));
+                [sides, u64::from(shift.x.abs_diff(parent.x)), u64::from(turn.unsigned_abs()), u64::from(depth)]
+            };
+            (0..500).map(of).fold([0; 4], |sums: [u64; 4], changes| std::array::from_fn(|i| sums[i] + changes[i]))
+        };
+        let (large, small) = (spread(STEP_MAX), spread(STEP_MIN));
+        for (kind, (large, small)) in large.into_iter().zip(small).enumerate() {
+            assert!(large > 20 * small && large > 0, "kind {kind}: {large} against {small}");
+        }
+    }
+
+    #[test]
+    fn newborn_tiles_lie_in_front_of_what_shows_and_follow_a_sure_guide() {
+        let rules = rules();
+        let local = GuideSample { direction: 5_000, coherence: 255, size_q12: 4_096 };
+        let mut sides = (u32::MAX, 0);
+        for number in 0..2_000 {
+            let child = newborn(&setting(&rules), (17, 33), 1 << 20, local, draws(number));
+            assert!(child.z < 1 << 20 && child.z + rules.depth_gap >= 1 << 20);
+            assert_eq!((child.x, child.y), (17 * 64, 33 * 64));
+            let off = child.angle.wrapping_sub(local.direction) as i16;
+            assert!(off.unsigned_abs() < 4 * rules.births.angle_spread as u16, "turned {off} away");
+            sides = (sides.0.min(child.w), sides.1.max(child.h));
+        }
+        assert!(sides.0 < 512 / 8 && sides.1 > 512 * 5, "sides from {} to {}", sides.0, sides.1);
+        let unsure = GuideSample { coherence: 0, ..local };
+        let turns = (0..400).map(|number| newborn(&setting(&rules), (1, 1), 5, unsure, draws(number)).angle >> 13);
+        assert_eq!(turns.collect::<std::collections::BTreeSet<_>>().len(), 8, "without a guide all angles occur");
+    }
+
+    #[test]
+    fn strokes_have_their_longer_side_along_the_guide() {
+        let mut rules = rules();
+        rules.births.is_stroke = 1;
+        let local = GuideSample { direction: 0, coherence: 0, size_q12: 4_096 };
+        for number in 0..500 {
+            let child = newborn(&setting(&rules), (9, 9), 99, local, draws(number));
+            assert!(child.w >= child.h);
+        }
+    }
+
+    #[test]
+    fn bounded_flies_keep_to_sides_and_aspect_and_bounded_again_stay_as_they_are() {
+        let bounds = Bounds { side_min_q8: 150, side_max_q8: 410, aspect_max_q8: 410, local_size: 0 };
+        for number in 0..3_000 {
+            let side = |slot| 16 + draws(number).below(slot, 3_000);
+            let child = bounded(&Fly { w: side(0), h: side(1), ..fly(0) }, &bounds, 500);
+            let (long, short) = (child.w.max(child.h), child.w.min(child.h));
+            assert!(short >= 500 * 150 / 256 && long <= 500 * 410 / 256, "{long} by {short}");
+            assert!(long * 256 <= short * 410, "{long} by {short}");
+            assert_eq!(bounded(&child, &bounds, 500), child);
+        }
+    }
+
+    #[test]
+    fn the_penalty_of_a_turn_is_least_along_the_guide_and_across_it() {
+        let mut rules = rules();
+        rules.penalties.turn = 60;
+        let local = GuideSample { direction: 3_000, coherence: 0, size_q12: 4_096 };
+        let penalty = |angle: u16| turn_penalty(&fly(angle), &rules, local);
+        for quarter in [0, 16_384, 32_768, 49_152] {
+            assert_eq!(penalty(3_000_u16.wrapping_add(quarter)), 0);
+        }
+        // 10 x 7.5 px at 45 degrees: 60 for each pixel.
+        assert_eq!(penalty(3_000 + 8_192), 75 * 60);
+        assert!(penalty(3_000 + 4_096) < penalty(3_000 + 6_000));
+        rules.penalties.turn = 0;
+        assert_eq!(turn_penalty(&fly(9_999), &rules, local), 0);
+    }
+
+    #[test]
+    fn a_mutant_differs_from_its_parent_in_every_gene_but_its_mask() {
+        let mut rules = rules();
+        rules.births.kind = BirthKind::Mutant;
+        let parent = Fly { r: 30_000, g: 30_000, b: 30_000, mask: 3, ..fly(1_000) };
+        let child = (0..50).map(|number| mutant(&parent, &setting(&rules), draws(number)));
+        let differs = |of: fn(&Fly) -> i64| child.clone().filter(|child| of(child) != of(&parent)).count() > 25;
+        let genes: [fn(&Fly) -> i64; 6] =
+            [|f| f.x.into(), |f| f.y.into(), |f| f.z.into(), |f| f.r.into(), |f| f.w.into(), |f| f.angle.into()];
+        assert!(genes.into_iter().all(differs));
+        assert!(child.clone().all(|child| child.mask == 3));
+    }
 }

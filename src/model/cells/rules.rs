@@ -102,6 +102,8 @@ pub struct Births {
     pub side_high: i32,
     /// Largest ratio of the two sides, as a logarithm in steps of 1/256.
     pub aspect_high: i32,
+    /// Whether the longer side is the width, which lies along the guide's direction (1), or either (0).
+    pub is_stroke: u32,
     /// Standard deviation of the angle around the guide's direction, in 1/65536 of a turn.
     pub angle_spread: u32,
     /// Where the guide's coherence (0 to 255) is below a random number of 0 to this, the angle is random; 0 always follows
@@ -230,6 +232,7 @@ impl Rules {
                 side_low: -654,
                 side_high: 459,
                 aspect_high: 1024,
+                is_stroke: 0,
                 angle_spread: 400,
                 coherence_range: 128,
             },

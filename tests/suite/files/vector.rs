@@ -138,7 +138,7 @@ fn upright_tiles_and_tiles_of_one_depth_come_out_of_resvg_as_ours() {
 fn an_evolved_mosaic_comes_out_of_resvg_as_ours() {
     let workshop = Workshop::new();
     let photo = photo_path("parrots.png");
-    let line = format!("evolve {} --size 128 -n 400 --births 5k -o a.npz", photo.display());
+    let line = format!("evolve {} --scheme paper --size 128 -n 400 --births 5k -o a.npz", photo.display());
     assert_eq!(workshop.run(&line).code, Some(0));
     let population = archive::read(&workshop.path("a.npz")).unwrap().population;
     assert_compared(compare(&population, 128, 1), 0.15);
