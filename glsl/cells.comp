@@ -102,7 +102,7 @@ bool afford(uint count) {
 }
 
 uint member(uint place) {
-    return deals[2u * rules[0].fly_count + cell.first + place];
+    return deals[2u * rule.fly_count + cell.first + place];
 }
 
 void store_candidate(uint slot, Candidate candidate) {
@@ -147,7 +147,7 @@ Candidate load_candidate(uint slot) {
 uint least_helpful(uint draws) {
     int least = 0x7FFFFFFF;
     uint best = 0u;
-    for (uint number = 0u; number < rules[0].victim_tournament; ++number) {
+    for (uint number = 0u; number < rule.victim_tournament; ++number) {
         uint place = chain_below(draws, SLOT_VICTIM + number, cell.count);
         int value = fitness[member(place)];
         best = value < least ? place : best;
@@ -161,7 +161,7 @@ uvec3 worst_pixel(uint draws) {
     uvec4 bounds = grid_bounds(grid, cell_number);
     int worst = -1;
     uvec3 best = uvec3(bounds.xy, 0u);
-    for (uint number = 0u; number < rules[0].place_tournament; ++number) {
+    for (uint number = 0u; number < rule.place_tournament; ++number) {
         uint bits = chain_bits(draws, SLOT_PLACE + number);
         uvec2 pixel = bounds.xy
             + uvec2(below(bits << 16, bounds.z - bounds.x), below(bits & 0xFFFF0000u, bounds.w - bounds.y));
@@ -195,13 +195,13 @@ void make_birth(inout Candidate candidate, uint place, int place_fitness, uint d
 
 void make_change(inout Candidate candidate, Fly fly, uint index, uint step, uint draws) {
     uint kind = chain_bits(draws, SLOT_KIND) & 0xFFFFu;
-    uint which = kind * rules[0].mix_total >> 16;
+    uint which = kind * rule.mix_total >> 16;
     uint side = own_side(index, local_at(fly));
-    uint edge = rules[0].edge;
-    uint turn = edge + rules[0].turn;
-    uint shift = turn + rules[0].shift;
-    uint depth = shift + rules[0].depth;
-    candidate.paint = chain_bits(draws, SLOT_RECOLOR) >> 16 < rules[0].recolor_q16 ? PAINT_ANEW : PAINT_KEEP;
+    uint edge = rule.edge;
+    uint turn = edge + rule.turn;
+    uint shift = turn + rule.shift;
+    uint depth = shift + rule.depth;
+    candidate.paint = chain_bits(draws, SLOT_RECOLOR) >> 16 < rule.recolor_q16 ? PAINT_ANEW : PAINT_KEEP;
     candidate.fly = fly;
     if (which < edge) {
         candidate.fly = edge_moved(fly, side, step, draws);
@@ -225,7 +225,7 @@ Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uin
     candidate.fly = fly;
     candidate.victim = place;
     candidate.is_valid = true;
-    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rules[0].birth_q16) {
+    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.birth_q16) {
         make_birth(candidate, place, place_fitness, draws);
     } else {
         make_change(candidate, fly, index, steps[index], draws);
@@ -264,7 +264,7 @@ struct Seen {
 const uint SCRATCH_WORDS = 1u + DRESSED;
 
 uint scratch_place(uint place, uint word) {
-    return cell_number * rules[0].scratch_words + (place * SCRATCH_WORDS + word) * LANES + gl_LocalInvocationID.x;
+    return cell_number * rule.scratch_words + (place * SCRATCH_WORDS + word) * LANES + gl_LocalInvocationID.x;
 }
 
 uvec3 channels_of(uint color) {
@@ -300,7 +300,7 @@ Seen look(Fly child, uint index, Footprint footprint, bool has_color) {
                     shown = pixels[place + 1u].xyz;
                 }
                 crowded |= top.x >> 24 == STACK_DEPTH ? 1u : 0u;
-                change += int(rules[0].overlap);
+                change += int(rule.overlap);
                 if (child.z < shown.y || child.z == shown.y && index < shown.x) {
                     Want want = want_of(top.z);
                     shows = 1u;
@@ -570,7 +570,7 @@ void exchange(Exchange change, ivec4 boxes[2]) {
     turns += max_all(inner_turns) + patch_turns(boxes[0], 0u) + patch_turns(boxes[1], 0u);
     covered = subgroupAdd(covered);
     if (subgroupElect()) {
-        add_fitness(change.fly, -covered * int(rules[0].overlap));
+        add_fitness(change.fly, -covered * int(rule.overlap));
     }
 }
 
@@ -593,9 +593,10 @@ void add_to_header(uvec2 evals, uvec2 births, uvec2 accepted, uvec2 change) {
 }
 
 void main() {
+    rule = rules[0];
     cell_number = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint round = header[0].round;
-    grid = grid_new(search_seed(), round, picture_size(), rules[0].side_shift);
+    grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
     if (header[0].pending == 0u || cell_number >= grid.columns * grid.rows) {
         return;
     }
@@ -607,9 +608,9 @@ void main() {
     sync();
     uint chain = chain_then(chain_new(search_seed(), round, DRAW_STEP), cell_number);
     uint lane = gl_LocalInvocationID.x;
-    uint candidates = rules[0].candidates;
+    uint candidates = rule.candidates;
     uint batches = (candidates + BATCH - 1u) / BATCH;
-    uint step_count = cell.count * rules[0].steps_per_fly;
+    uint step_count = cell.count * rule.steps_per_fly;
     uint end = step_count + cell.count;
     uint step = cell.step;
     turns = STEP_TURNS;
@@ -620,7 +621,7 @@ void main() {
     uvec2 change_sum = uvec2(0u);
     while (step < end) {
         bool is_removal = step >= step_count;
-        uint tournaments = rules[0].place_tournament + rules[0].victim_tournament;
+        uint tournaments = rule.place_tournament + rule.victim_tournament;
         uint making = STEP_TURNS + (is_removal ? 0u : batches * (BATCH_TURNS + tournaments));
         if (!afford(making)) {
             break;
@@ -653,7 +654,7 @@ void main() {
             sync();
         }
         bool is_accepted = false;
-        if (best.candidate.is_valid && best.change <= rules[0].highest && !is_over) {
+        if (best.candidate.is_valid && best.change <= rule.highest && !is_over) {
             is_accepted = has_room(best);
         }
         if (is_removal) {

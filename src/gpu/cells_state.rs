@@ -8,7 +8,7 @@ use crate::model::cells::rules::{Acceptance, CLASSES_MAX, SEARCH_SIDE_MAX};
 use crate::model::cells::{Course, Rules, Stacks};
 use crate::model::fly::UNITS_PER_PX;
 use crate::model::tile::pack;
-use crate::model::{Fly, NO_FLY};
+use crate::model::{Blend, Fly, NO_FLY};
 
 /// Pixels of a block.
 const BLOCK_PIXELS: usize = (BLOCK_SIDE_PX * BLOCK_SIDE_PX) as usize;
@@ -88,7 +88,12 @@ fn side_max(rules: &Rules) -> u32 {
 
 /// Refuses what would not fit the 32 bits of fitness and changes, or of indices.
 pub(super) fn check(course: &Course) -> Result<()> {
-    let Course { rules, target, .. } = course;
+    let Course { rules, target, masks, .. } = course;
+    if masks.blend() == Blend::Translucent {
+        return Err(Error::NoSuitableDevice {
+            why: "a Vulkan device does not search with translucent masks; use --device cpu".to_owned(),
+        });
+    }
     let side_px = u64::from(side_max(rules).div_ceil(UNITS_PER_PX)) + 2;
     let pixels = (side_px * side_px).min(u64::from(target.width_px()) * u64::from(target.height_px()));
     let penalties = &rules.penalties;
