@@ -64,6 +64,11 @@ impl Plan {
         (side.min(self.width_px), side.min(self.height_px))
     }
 
+    /// Longest side of a tile in px, with what its pixels may reach beyond.
+    pub fn largest_side_px(&self, rules: &Rules) -> u32 {
+        side_max(rules).div_ceil(UNITS_PER_PX) + 1
+    }
+
     /// Where a pixel lies in the state.
     pub fn place(&self, x: u32, y: u32) -> usize {
         let block = y / BLOCK_SIDE_PX * self.block_columns + x / BLOCK_SIDE_PX;
