@@ -162,6 +162,11 @@ Fly newborn(uint side, uvec2 pixel, uint shown_z, GuideSample local, uint draws)
     int log_w = rule.side_low + int(chain_below(draws, SLOT_OPERATOR, range));
     int log_h = rule.side_low + int(chain_below(draws, SLOT_OPERATOR + 1u, range));
     log_h = clamp(log_h, log_w - rule.aspect_high, log_w + rule.aspect_high);
+    if (rules[0].is_stroke != 0u) {
+        int longer = max(log_w, log_h);
+        log_h = min(log_w, log_h);
+        log_w = longer;
+    }
     uint bits = chain_bits(draws, SLOT_OPERATOR + 2u);
     bool follows = local.coherence >= below(bits << 16, rule.coherence_range + 1u);
     int around = int(rule.angle_spread) * bell_q8(draws, SLOT_OPERATOR + 3u) + 128 >> 8;

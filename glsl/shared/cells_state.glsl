@@ -47,6 +47,7 @@ struct SearchRules {
     int side_low;
     int side_high;
     int aspect_high;
+    uint is_stroke;
     uint angle_spread;
     uint coherence_range;
     uint side_min_q8;

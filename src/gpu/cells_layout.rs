@@ -79,6 +79,8 @@ pub struct SearchRules {
     pub side_high: i32,
     /// Aspect high.
     pub aspect_high: i32,
+    /// Whether the longer side of a newborn tile is its width.
+    pub is_stroke: u32,
     /// Angle spread.
     pub angle_spread: u32,
     /// Coherence range.

@@ -154,6 +154,7 @@ pub(super) fn rules_record(course: &Course, plan: &Plan, scratch_words: u32) -> 
         side_low: births.side_low,
         side_high: births.side_high,
         aspect_high: births.aspect_high,
+        is_stroke: births.is_stroke,
         angle_spread: births.angle_spread,
         coherence_range: births.coherence_range,
         side_min_q8: rules.bounds.side_min_q8,

@@ -139,7 +139,10 @@ fn courses() -> Vec<(&'static str, Course)> {
     let photo = || parrots(200, 200, 100, 90);
     let plain = |change: fn(&mut Rules)| course(photo(), 200, change);
     let masks = Arc::new(holed_masks());
-    let every_mask = |rules: &mut Rules| rules.mask_count = 3;
+    let every_mask = |rules: &mut Rules| {
+        rules.mask_count = 3;
+        rules.births.is_stroke = 1;
+    };
     vec![
         (
             "means, penalties and own sides",

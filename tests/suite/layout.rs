@@ -112,7 +112,7 @@ fn twins() -> Vec<Twin> {
             highest = "highest", birth_q16 = "birth_q16", recolor_q16 = "recolor_q16", edge = "edge", turn = "turn",
             shift = "shift", depth = "depth", mix_total = "mix_total", place_tournament = "place_tournament",
             victim_tournament = "victim_tournament", side_low = "side_low", side_high = "side_high",
-            aspect_high = "aspect_high", angle_spread = "angle_spread", coherence_range = "coherence_range",
+            aspect_high = "aspect_high", is_stroke = "is_stroke", angle_spread = "angle_spread", coherence_range = "coherence_range",
             side_min_q8 = "side_min_q8", side_max_q8 = "side_max_q8", aspect_max_q8 = "aspect_max_q8",
             overlap = "overlap", turn_penalty = "turn_penalty", mask_first = "mask_first", mask_count = "mask_count",
             depth_gap = "depth_gap", grout = "grout", grout_color = "grout_color", guide_columns = "guide_columns", guide_rows = "guide_rows",
