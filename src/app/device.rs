@@ -20,7 +20,12 @@ pub(super) enum Selected {
         reason: Option<String>,
     },
     /// A Vulkan device.
-    Vulkan { device: Arc<Device>, validation_log: Arc<ValidationLog> },
+    Vulkan {
+        device: Arc<Device>,
+        validation_log: Arc<ValidationLog>,
+        /// Whether somebody asked for Vulkan; else the CPU may stand in for it.
+        is_asked_for: bool,
+    },
 }
 
 /// An evaluator that is ready to work.
@@ -60,6 +65,8 @@ impl Timed {
 /// A search that is ready to begin.
 pub(super) struct OpenedSearch {
     pub search: Box<dyn Search>,
+    /// Why the CPU searches in place of a device that nobody asked for, to follow the word "since".
+    pub stand_in: Option<String>,
     /// What the validation layer says; complete once the search is gone.
     pub validation_log: Option<Arc<ValidationLog>>,
 }
@@ -75,10 +82,10 @@ pub(super) fn select(request: &DeviceRequest, validation: Validation) -> Result<
         return Ok(Selected::Cpu { reason: None });
     }
     let is_asked_for = *request != DeviceRequest::Auto || validation == Validation::On;
-    unless_nobody_asked(find_and_open(request, validation), is_asked_for)
+    unless_nobody_asked(find_and_open(request, validation, is_asked_for), is_asked_for)
 }
 
-fn find_and_open(request: &DeviceRequest, validation: Validation) -> Result<Selected> {
+fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: bool) -> Result<Selected> {
     let instance = Instance::create(InstanceOptions { validation })?;
     let devices = instance.physical_devices()?;
     let index = match choose(request, &devices)? {
@@ -92,7 +99,7 @@ fn find_and_open(request: &DeviceRequest, validation: Validation) -> Result<Sele
     let info = devices.iter().find(|info| info.index == index);
     let info = info.ok_or_else(|| Error::Internal(format!("device {index} was chosen and is not listed")))?;
     let device = Device::create(&instance, info, &DeviceOptions::default())?;
-    Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()) })
+    Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()), is_asked_for })
 }
 
 /// The CPU twin in place of a Vulkan that failed and that nobody asked for.
@@ -127,7 +134,7 @@ impl Selected {
     pub(super) fn open(&self, scenes: Vec<Scene>) -> Result<Opened> {
         match self {
             Self::Cpu { .. } => Ok(Opened { evaluator: Box::new(CpuEvaluator::new(scenes)), validation_log: None }),
-            Self::Vulkan { device, validation_log } => {
+            Self::Vulkan { device, validation_log, .. } => {
                 let evaluator = Box::new(GpuEvaluator::create(device, scenes)?);
                 Ok(Opened { evaluator, validation_log: Some(Arc::clone(validation_log)) })
             }
@@ -156,17 +163,27 @@ impl Selected {
         }
     }
 
-    /// A search in cells on this device, which begins with absent flies.
+    /// A search in cells on this device, which begins with absent flies. Where nobody asked for the device, the CPU twin searches what the
+    /// device has no room for: it comes to the same bytes.
     ///
     /// # Errors
-    /// If the device has no room for the search, or its tiles are too large for it.
+    /// If a device that was asked for has no room for the search, or its numbers do not fit it.
     pub(super) fn open_search(&self, course: Course) -> Result<OpenedSearch> {
+        let on_cpu = |course, stand_in| OpenedSearch {
+            search: Box::new(CpuSearch::new(course)),
+            stand_in,
+            validation_log: None,
+        };
         match self {
-            Self::Cpu { .. } => Ok(OpenedSearch { search: Box::new(CpuSearch::new(course)), validation_log: None }),
-            Self::Vulkan { device, validation_log } => {
-                let search = Box::new(VulkanSearch::new(device, course)?);
-                Ok(OpenedSearch { search, validation_log: Some(Arc::clone(validation_log)) })
-            }
+            Self::Cpu { .. } => Ok(on_cpu(course, None)),
+            Self::Vulkan { device, validation_log, is_asked_for } => match VulkanSearch::new(device, course.clone()) {
+                Ok(search) => {
+                    let validation_log = Some(Arc::clone(validation_log));
+                    Ok(OpenedSearch { search: Box::new(search), stand_in: None, validation_log })
+                }
+                Err(error) if !is_asked_for => Ok(on_cpu(course, Some(why_no_vulkan(&error)))),
+                Err(error) => Err(error),
+            },
         }
     }
 }

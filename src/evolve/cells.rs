@@ -14,8 +14,11 @@ use crate::model::{Fly, Rgb};
 
 /// Version of the search: raised whenever the same picture, options and seed lead to another result.
 pub const CELLS_VERSION: u32 = 1;
-/// Rounds of an epoch; after each so many, depths are spread evenly again.
+/// Most rounds of an epoch; after each so many, depths are spread evenly again.
 pub const ROUNDS_PER_EPOCH: u32 = 4;
+/// Evals that an epoch of several rounds may have: clock and interrupts are looked at between epochs, and have to wait no longer
+/// than some tenths of a second.
+const EVALS_PER_EPOCH: u64 = 250_000;
 /// Evals for each fly, unless asked otherwise: two million for the 5,000 flies of a picture of 512x512 px.
 pub const EVALS_PER_FLY: u64 = 400;
 /// Epochs in a row without an eval after which none is to be expected any more, as of a picture too small for a child.
@@ -144,15 +147,14 @@ pub fn run(
 /// there all rounds are asked for at once, so that a device need not wait between them.
 fn advance(search: &mut dyn Search, budget: &Budget, observer: &mut dyn Observer) -> Result<()> {
     let begun = search.standing();
-    // A round has at most this many evals: a step for each fly that a cell may hold, and each step all its candidates.
-    let rules = &search.course().rules;
-    let most = search.course().fly_count as u64 * u64::from(rules.steps_per_fly) * u64::from(rules.candidates);
-    let is_near_the_end = budget.evals.saturating_sub(begun.evals) <= most * u64::from(ROUNDS_PER_EPOCH);
+    let most = evals_per_round(search.course());
+    let rounds = (EVALS_PER_EPOCH / most.max(1)).clamp(1, u64::from(ROUNDS_PER_EPOCH)) as u32;
+    let is_near_the_end = budget.evals.saturating_sub(begun.evals) <= most * u64::from(rounds);
     if !observer.looks_at_rounds() && !is_near_the_end {
-        search.advance(ROUNDS_PER_EPOCH)?;
+        search.advance(rounds)?;
         return search.renormalise();
     }
-    for _ in 0..ROUNDS_PER_EPOCH {
+    for _ in 0..rounds {
         search.advance(1)?;
         if observer.looks_at_rounds() {
             observer.after_round(search)?;
@@ -162,6 +164,11 @@ fn advance(search: &mut dyn Search, budget: &Budget, observer: &mut dyn Observer
         }
     }
     search.renormalise()
+}
+
+/// The most evals that a round can have: steps for each fly, and all candidates in each.
+fn evals_per_round(course: &Course) -> u64 {
+    course.fly_count as u64 * u64::from(course.rules.steps_per_fly) * u64::from(course.rules.candidates)
 }
 
 /// Why the search ends here, if it does; `mark` is where the objective had fallen by a thousandth for the last time.

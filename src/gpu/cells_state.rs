@@ -103,9 +103,10 @@ pub(super) fn check(course: &Course) -> Result<()> {
     let pixels = (side_px * side_px).min(u64::from(target.width_px()) * u64::from(target.height_px()));
     let penalties = &rules.penalties;
     let weight = target.weights().map_or(1, |weights| u64::from(weights.iter().copied().max().unwrap_or(1)));
-    let most = 765 * weight + u64::from(penalties.hole) + 2 * u64::from(penalties.overlap) + u64::from(penalties.turn);
+    let most = 765 * weight + u64::from(penalties.hole) + 2 * u64::from(penalties.overlap);
     // Two fitnesses add up to less than 2^31.
-    if pixels * most >= 1 << 30 {
+    // The penalty of a turn counts a tile's whole area, also beyond the picture.
+    if pixels * most + side_px * side_px * u64::from(penalties.turn) >= 1 << 30 {
         return Err(Error::TooLarge(format!(
             "a tile may cover {pixels} pixels with an error of up to {most} each, which does not fit the 32 bits of a Vulkan device; use more --tiles, a smaller --size, or --device cpu"
         )));

@@ -5,7 +5,7 @@ use super::curve::SearchCurve;
 use crate::app::curve_file::Tabled;
 use crate::app::device::{Opened, OpenedSearch, Selected};
 use crate::app::job::Job;
-use crate::app::options::EvolveOptions;
+use crate::app::options::{EvolveOptions, Verbosity};
 use crate::app::progress::Progress;
 use crate::app::provenance::{Course, Ending};
 use crate::app::report::{self, Row};
@@ -27,7 +27,13 @@ pub(in crate::app) fn search_job(
 ) -> Result<Evolved> {
     let budget = cells.budget(job.fly_count);
     let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress)).of_search(budget.evals);
-    let OpenedSearch { mut search, validation_log } = selected.open_search(job.course(cells))?;
+    let OpenedSearch { mut search, stand_in, validation_log } = selected.open_search(job.course(cells))?;
+    if let Some(reason) = stand_in {
+        row.device = Some("CPU".to_owned());
+        if options.verbosity > Verbosity::Quiet {
+            report::say(&format!("smalti: searching on the CPU, since {reason}"));
+        }
+    }
     let mut curve = (!options.curves.is_empty()).then(|| SearchCurve::new(budget.evals));
     let given = job.given_flies(cells.seed);
     let ran = cells::run(&mut *search, given.as_deref(), &budget, &mut (&mut watch, &mut curve));

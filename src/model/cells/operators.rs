@@ -70,7 +70,7 @@ impl Setting<'_> {
 #[inline]
 #[must_use]
 pub fn bounded(fly: &Fly, bounds: &Bounds, own_side: u32) -> Fly {
-    let low = ((own_side * bounds.side_min_q8) >> 8).max(SIDE_MIN);
+    let low = ((own_side * bounds.side_min_q8) >> 8).clamp(SIDE_MIN, SEARCH_SIDE_MAX);
     let high = ((own_side * bounds.side_max_q8) >> 8).clamp(low, SEARCH_SIDE_MAX);
     let (w, h) = (fly.w.clamp(low, high), fly.h.clamp(low, high));
     let longest = |other: u32| {
@@ -207,16 +207,17 @@ pub fn turn_penalty(fly: &Fly, rules: &Rules, local: GuideSample) -> i64 {
         return 0;
     }
     let deviation = (i32::from(fly.angle.wrapping_sub(local.direction).wrapping_add(8_192) & 16_383) - 8_192) as u32;
-    // 0 to 256 at 45 degrees; the area in 1/16 px.
+    // 0 to 256 at 45 degrees; the area in 1/16 px, one less for the largest of tiles so that the product fits 32 bits. With a
+    // penalty of at most `TURN_MAX` the result is below 2^30.
     let squared = deviation.wrapping_mul(deviation) >> 18;
-    let area = (fly.w >> 4) * (fly.h >> 4);
+    let area = ((fly.w >> 4) * (fly.h >> 4)).min((1 << 24) - 1);
     i64::from(((area * squared) >> 12) * rules.penalties.turn)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::random::Draw;
-    use super::super::rules::{BirthKind, STEP_MAX, STEP_MIN};
+    use super::super::rules::{BirthKind, STEP_MAX, STEP_MIN, TURN_MAX};
     use super::*;
 
     const SIZE_PX: (u32, u32) = (300, 200);
@@ -341,6 +342,10 @@ mod tests {
         assert!(penalty(3_000 + 4_096) < penalty(3_000 + 6_000));
         rules.penalties.turn = 0;
         assert_eq!(turn_penalty(&fly(9_999), &rules, local), 0);
+        rules.penalties.turn = TURN_MAX;
+        let largest = Fly { w: SEARCH_SIDE_MAX, h: SEARCH_SIDE_MAX, ..fly(3_000 + 8_192) };
+        let cost = turn_penalty(&largest, &rules, local);
+        assert!(cost < 1 << 30 && cost > 1_000_000_000, "{cost}");
     }
 
     #[test]
@@ -354,5 +359,12 @@ mod tests {
             [|f| f.x.into(), |f| f.y.into(), |f| f.z.into(), |f| f.r.into(), |f| f.w.into(), |f| f.angle.into()];
         assert!(genes.into_iter().all(differs));
         assert!(child.clone().all(|child| child.mask == 3));
+    }
+
+    #[test]
+    fn bounds_beyond_the_largest_side_of_all_are_that_side() {
+        let bounds = Bounds { side_min_q8: 2 << 8, side_max_q8: 16 << 8, aspect_max_q8: 256, local_size: 0 };
+        let child = bounded(&fly(0), &bounds, SEARCH_SIDE_MAX);
+        assert_eq!((child.w, child.h), (SEARCH_SIDE_MAX, SEARCH_SIDE_MAX));
     }
 }

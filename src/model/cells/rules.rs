@@ -142,8 +142,8 @@ pub struct Penalties {
     pub overlap: u32,
     /// For each pixel that no tile covers.
     pub hole: u32,
-    /// For a tile that is turned 45 degrees (mod 90) from the guide's direction, per pixel of its area; the penalty grows with
-    /// the square of the deviation.
+    /// For a tile that is turned 45 degrees (mod 90) from the guide's direction, per pixel of its area, at most [`TURN_MAX`];
+    /// the penalty grows with the square of the deviation.
     pub turn: u32,
 }
 
@@ -194,6 +194,8 @@ pub struct Rules {
 pub const SIDE_MAX_Q8: u32 = 16 << 8;
 /// An aspect that bounds nothing.
 pub const ASPECT_FREE_Q8: u32 = 1 << 14;
+/// Largest of [`Penalties::turn`].
+pub const TURN_MAX: u32 = 1_000;
 /// Most classes of a population.
 pub const CLASSES_MAX: usize = 4;
 /// Largest scale of a class: 8.
