@@ -32,6 +32,7 @@ mod shaders_fresh;
 mod shapes;
 mod snapshots;
 mod spirv;
+mod styles_vulkan;
 mod timelapse;
 mod translucent_search;
 mod transparency;
