@@ -4,13 +4,11 @@ use std::sync::Arc;
 
 use super::cells_layout::{CellRecord, FlyRecord, SearchHeader};
 use super::cells_pass::{CellShape, CellsPass};
-use super::cells_state::{self, PIXEL_WORDS, Plan, STACK_WORDS};
+use super::cells_state::{self, PIXEL_WORDS, Plan};
 use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
 use crate::model::Fly;
-use crate::model::blocks::{depth_order, index_of};
-use crate::model::cells::{Course, Search, SearchState, Stacks, Standing};
-use crate::model::fly::Z_MAX;
+use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, depths};
 use crate::vk::{Buffer, Device, Recorder, Timing};
 
 /// Most iterations of a submission: with the budget of a dispatch well below a watchdog's second.
@@ -142,12 +140,9 @@ impl Search for VulkanSearch {
     }
 
     fn renormalise(&mut self) -> Result<()> {
-        let mut flies = self.read_flies()?;
-        let order = depth_order(&flies.iter().map(FlyRecord::fly).collect::<Vec<Fly>>());
-        let count = order.len() as u64;
-        for (rank, key) in (0_u64..).zip(order) {
-            flies[index_of(key) as usize].z = ((2 * rank + 1) * (u64::from(Z_MAX) + 1) / (2 * count)) as u32;
-        }
+        let mut flies: Vec<Fly> = self.read_flies()?.iter().map(FlyRecord::fly).collect();
+        depths::spread(&mut flies);
+        let flies: Vec<FlyRecord> = flies.iter().map(FlyRecord::new).collect();
         let mut pixels = self.read_pixels()?;
         cells_state::set_depths(&mut pixels, &flies);
         self.recorder.write_buffer(&self.pass.buffers.flies, 0, bytemuck::cast_slice(&flies))?;
@@ -171,7 +166,7 @@ impl Search for VulkanSearch {
     fn read_back_stacks(&mut self) -> Result<Stacks> {
         let pixels = self.read_pixels()?;
         let buffer = Arc::clone(&self.pass.buffers.stacks);
-        let words: Vec<u32> = self.read(&buffer, self.plan.pixel_count() * STACK_WORDS)?;
+        let words: Vec<u32> = self.read(&buffer, self.plan.stack_words())?;
         Ok(cells_state::stacks(&self.plan, &pixels, &words))
     }
 }
