@@ -11,18 +11,18 @@
 layout(local_size_x = 64) in;
 
 uint first_round(uint fly) {
-    uint count = rules[0].class_count;
-    uint round = rules[0].first_round_3;
-    round = count <= 3u || fly < rules[0].end_2 ? rules[0].first_round_2 : round;
-    round = count <= 2u || fly < rules[0].end_1 ? rules[0].first_round_1 : round;
-    return count <= 1u || fly < rules[0].end_0 ? rules[0].first_round_0 : round;
+    uint count = rule.class_count;
+    uint round = rule.first_round_3;
+    round = count <= 3u || fly < rule.end_2 ? rule.first_round_2 : round;
+    round = count <= 2u || fly < rule.end_1 ? rule.first_round_1 : round;
+    return count <= 1u || fly < rule.end_0 ? rule.first_round_0 : round;
 }
 
 // The cell of the worst of some random pixels.
 uint deal_absent(Grid grid, uint draws) {
     int worst = -1;
     uint cell = 0u;
-    for (uint number = 0u; number < rules[0].deal_tournament; ++number) {
+    for (uint number = 0u; number < rule.deal_tournament; ++number) {
         uvec2 pixel = uvec2(
             chain_below(draws, 2u * number, grid.size.x), chain_below(draws, 2u * number + 1u, grid.size.y)
         );
@@ -34,12 +34,13 @@ uint deal_absent(Grid grid, uint draws) {
 }
 
 void main() {
+    rule = rules[0];
     uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
     uint round = header[0].round;
-    if (index >= rules[0].fly_count || header[0].pending != 0u || round >= header[0].wanted) {
+    if (index >= rule.fly_count || header[0].pending != 0u || round >= header[0].wanted) {
         return;
     }
-    Grid grid = grid_new(search_seed(), round, picture_size(), rules[0].side_shift);
+    Grid grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
     Fly fly = flies[index];
     uint cell = NO_CELL;
     if (is_alive(fly)) {

@@ -32,7 +32,7 @@ layout(std430, binding = 10) readonly buffer StacksBuffer { uvec2 stacks[]; };
 #include "shared/cells_operators.glsl"
 
 void begin_fly(uint index) {
-    if (index < rules[0].fly_count) {
+    if (index < rule.fly_count) {
         Fly fly = flies[index];
         fitness[index] = is_alive(fly) ? -turn_penalty(fly, guide_at(ivec2(fly.x, fly.y) >> 6)) : 0;
     }
@@ -51,6 +51,7 @@ int error_behind(Compositing pixel, uint stack, uint first, uint depth, uvec4 to
 }
 
 void main() {
+    rule = rules[0];
     if (header[0].is_fresh != ROUND_OVER) {
         return;
     }

@@ -143,7 +143,7 @@ struct Laid {
 };
 
 uint scratch_place(uint place, uint word) {
-    return cell_number * rules[0].scratch_words + (place * 4u + word) * LANES + gl_LocalInvocationID.x;
+    return cell_number * rule.scratch_words + (place * 4u + word) * LANES + gl_LocalInvocationID.x;
 }
 
 void lay_pixel(inout Laid laid, Folded folded, uint shade, uvec4 top) {
@@ -389,9 +389,10 @@ void exchange(Swap change) {
 }
 
 void main() {
+    rule = rules[0];
     cell_number = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint round = header[0].round;
-    grid = grid_new(search_seed(), round, picture_size(), rules[0].side_shift);
+    grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
     if (header[0].pending == 0u || cell_number >= grid.columns * grid.rows) {
         return;
     }
@@ -403,9 +404,9 @@ void main() {
     sync();
     uint chain = chain_then(chain_new(search_seed(), round, DRAW_STEP), cell_number);
     uint lane = gl_LocalInvocationID.x;
-    uint candidates = rules[0].candidates;
+    uint candidates = rule.candidates;
     uint batches = (candidates + BATCH - 1u) / BATCH;
-    uint step_count = cell.count * rules[0].steps_per_fly;
+    uint step_count = cell.count * rule.steps_per_fly;
     uint end = step_count + cell.count;
     uint step = cell.step;
     turns = STEP_TURNS;
@@ -416,7 +417,7 @@ void main() {
     uvec2 change_sum = uvec2(0u);
     while (step < end) {
         bool is_removal = step >= step_count;
-        uint tournaments = rules[0].place_tournament + rules[0].victim_tournament;
+        uint tournaments = rule.place_tournament + rule.victim_tournament;
         uint making = STEP_TURNS + (is_removal ? 0u : batches * (BATCH_TURNS + tournaments));
         if (!afford(making)) {
             break;
@@ -448,7 +449,7 @@ void main() {
             }
             sync();
         }
-        bool is_accepted = best.candidate.is_valid && best.change <= rules[0].highest && !best.is_refused;
+        bool is_accepted = best.candidate.is_valid && best.change <= rule.highest && !best.is_refused;
         if (is_removal) {
             is_accepted = is_useless(index, fly, place_fitness, best);
         }

@@ -15,10 +15,11 @@ shared uint counts[THREADS];
 shared uint busy[THREADS];
 
 void main() {
+    rule = rules[0];
     uint thread = gl_LocalInvocationID.x;
     uint round = header[0].round;
     bool begins = header[0].pending == 0u && round < header[0].wanted;
-    Grid grid = grid_new(search_seed(), round, picture_size(), rules[0].side_shift);
+    Grid grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
     uint cell_count = begins ? grid.columns * grid.rows : 0u;
     // Each invocation takes a run of cells.
     uint run = (cell_count + THREADS - 1u) / THREADS;

@@ -11,8 +11,9 @@
 layout(local_size_x = 64) in;
 
 void main() {
+    rule = rules[0];
     uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
-    uint fly_count = rules[0].fly_count;
+    uint fly_count = rule.fly_count;
     if (index >= fly_count || header[0].is_fresh == 0u || deals[index] == NO_CELL) {
         return;
     }

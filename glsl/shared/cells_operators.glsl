@@ -20,19 +20,19 @@ struct GuideSample {
 };
 
 GuideSample guide_at(ivec2 pixel) {
-    uvec2 place = min(uvec2(max(pixel, ivec2(0))) >> 2, uvec2(rules[0].guide_columns, rules[0].guide_rows) - 1u);
-    uvec2 words = guide[place.y * rules[0].guide_columns + place.x];
+    uvec2 place = min(uvec2(max(pixel, ivec2(0))) >> 2, uvec2(rule.guide_columns, rule.guide_rows) - 1u);
+    uvec2 words = guide[place.y * rule.guide_columns + place.x];
     return GuideSample(words.x & 0xFFFFu, words.x >> 16, words.y);
 }
 
 uint own_side(uint fly, GuideSample local) {
-    uint scale = rules[0].scale_0;
-    scale = rules[0].class_count > 1u && fly >= rules[0].end_0 ? rules[0].scale_1 : scale;
-    scale = rules[0].class_count > 2u && fly >= rules[0].end_1 && fly >= rules[0].end_0 ? rules[0].scale_2 : scale;
-    scale = rules[0].class_count > 3u && fly >= rules[0].end_2 && fly >= rules[0].end_1 && fly >= rules[0].end_0
-        ? rules[0].scale_3
+    uint scale = rule.scale_0;
+    scale = rule.class_count > 1u && fly >= rule.end_0 ? rule.scale_1 : scale;
+    scale = rule.class_count > 2u && fly >= rule.end_1 && fly >= rule.end_0 ? rule.scale_2 : scale;
+    scale = rule.class_count > 3u && fly >= rule.end_2 && fly >= rule.end_1 && fly >= rule.end_0
+        ? rule.scale_3
         : scale;
-    uint side = min(rules[0].side * scale >> 12, SEARCH_SIDE_MAX);
+    uint side = min(rule.side * scale >> 12, SEARCH_SIDE_MAX);
     if (LOCAL_SIZE == 1u) {
         side = min(side * min(local.size_q12, 16384u) >> 12, SEARCH_SIDE_MAX);
     }
@@ -68,13 +68,13 @@ void set_angle(inout Fly fly, uint angle) {
 }
 
 uint longest(uint other, uint low, uint high) {
-    return rules[0].aspect_max_q8 >= ASPECT_FREE_Q8 ? high : max(other * rules[0].aspect_max_q8 >> 8, low);
+    return rule.aspect_max_q8 >= ASPECT_FREE_Q8 ? high : max(other * rule.aspect_max_q8 >> 8, low);
 }
 
 // `fly` with its sides within the bounds of a fly of this own side.
 void bound_sides(inout Fly fly, uint side) {
-    uint low = max(side * rules[0].side_min_q8 >> 8, SIDE_MIN);
-    uint high = clamp(side * rules[0].side_max_q8 >> 8, low, SEARCH_SIDE_MAX);
+    uint low = max(side * rule.side_min_q8 >> 8, SIDE_MIN);
+    uint high = clamp(side * rule.side_max_q8 >> 8, low, SEARCH_SIDE_MAX);
     uint w = clamp(fly.w, low, high);
     uint h = clamp(fly.h, low, high);
     fly.w = min(w, longest(h, low, high));
@@ -158,21 +158,21 @@ Fly repainted(Fly fly, uint step, uint draws) {
 
 // A new tile centred on a pixel.
 Fly newborn(uint side, uvec2 pixel, uint shown_z, GuideSample local, uint draws) {
-    uint range = uint(rules[0].side_high - rules[0].side_low + 1);
-    int log_w = rules[0].side_low + int(chain_below(draws, SLOT_OPERATOR, range));
-    int log_h = rules[0].side_low + int(chain_below(draws, SLOT_OPERATOR + 1u, range));
-    log_h = clamp(log_h, log_w - rules[0].aspect_high, log_w + rules[0].aspect_high);
+    uint range = uint(rule.side_high - rule.side_low + 1);
+    int log_w = rule.side_low + int(chain_below(draws, SLOT_OPERATOR, range));
+    int log_h = rule.side_low + int(chain_below(draws, SLOT_OPERATOR + 1u, range));
+    log_h = clamp(log_h, log_w - rule.aspect_high, log_w + rule.aspect_high);
     uint bits = chain_bits(draws, SLOT_OPERATOR + 2u);
-    bool follows = local.coherence >= below(bits << 16, rules[0].coherence_range + 1u);
-    int around = int(rules[0].angle_spread) * bell_q8(draws, SLOT_OPERATOR + 3u) + 128 >> 8;
+    bool follows = local.coherence >= below(bits << 16, rule.coherence_range + 1u);
+    int around = int(rule.angle_spread) * bell_q8(draws, SLOT_OPERATOR + 3u) + 128 >> 8;
     uint angle = follows ? local.direction + uint(around) : bits >> 16;
     bits = chain_bits(draws, SLOT_OPERATOR + 4u);
-    uint gap = 1u + below(bits, rules[0].depth_gap);
+    uint gap = 1u + below(bits, rule.depth_gap);
     uint z = RANDOM_DEPTH == 1u ? bits >> 8 : shown_z - min(shown_z, gap);
     uint r = chain_bits(draws, SLOT_OPERATOR + 5u) >> 16;
     uint g = chain_bits(draws, SLOT_OPERATOR + 6u) >> 16;
     uint b = chain_bits(draws, SLOT_OPERATOR + 7u) >> 16;
-    uint mask = rules[0].mask_first + chain_below(draws, SLOT_OPERATOR + 8u, rules[0].mask_count);
+    uint mask = rule.mask_first + chain_below(draws, SLOT_OPERATOR + 8u, rule.mask_count);
     return Fly(
         int(pixel.x * 64u), int(pixel.y * 64u), min(z, uint(Z_MAX)), r | g << 16, b | angle << 16, scaled(side, log_w),
         scaled(side, log_h), mask & 0xFFFFu | 1u << 16
@@ -192,7 +192,7 @@ int turn_penalty(Fly fly, GuideSample local) {
     uint deviation = (fly_angle(fly) - local.direction + 8192u & 16383u) - 8192u;
     uint squared = deviation * deviation >> 18;
     uint area = (fly.w >> 4) * (fly.h >> 4);
-    return int((area * squared >> 12) * rules[0].turn_penalty);
+    return int((area * squared >> 12) * rule.turn_penalty);
 }
 
 uint grown(uint step) {

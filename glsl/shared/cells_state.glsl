@@ -113,6 +113,9 @@ struct CellRecord {
 };
 
 layout(std430, binding = 0) readonly buffer RulesBuffer { SearchRules rules[]; };
+// The rules, read once: software Vulkan reads a buffer for each invocation anew. `main` does it first.
+SearchRules rule;
+
 layout(std430, binding = 1) coherent buffer HeaderBuffer { Header header[]; };
 layout(std430, binding = 2) coherent buffer FliesBuffer { Fly flies[]; };
 layout(std430, binding = 3) coherent buffer CellsBuffer { CellRecord cells[]; };
@@ -141,13 +144,13 @@ bool is_alive(Fly fly) {
 }
 
 uint pixel_place(uvec2 pixel) {
-    return ((pixel.y >> 3) * rules[0].columns + (pixel.x >> 3)) * 64u + (pixel.y & 7u) * 8u + (pixel.x & 7u);
+    return ((pixel.y >> 3) * rule.columns + (pixel.x >> 3)) * 64u + (pixel.y & 7u) * 8u + (pixel.x & 7u);
 }
 
 uvec2 picture_size() {
-    return uvec2(rules[0].width, rules[0].height);
+    return uvec2(rule.width, rule.height);
 }
 
 uvec2 search_seed() {
-    return uvec2(rules[0].seed_low, rules[0].seed_high);
+    return uvec2(rule.seed_low, rule.seed_high);
 }

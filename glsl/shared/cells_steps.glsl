@@ -1,6 +1,6 @@
 // What the steps of a cell have in common, whatever its tiles are: the candidates, their making, and counters. Twin:
-// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_patches.glsl, cells_suit.glsl and a push constant `budget`, and of each stage
-// `without_victim`, what a child costs before its pixels are looked at.
+// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_grid.glsl, cells_patches.glsl, cells_suit.glsl, a push constant `budget`, and
+// `without_victim`: what the objective changes when a child's victim goes, as far as no pixel has to be looked at for it.
 
 const uint PAINT_KEEP = 0u;
 const uint PAINT_ANEW = 1u;
@@ -56,7 +56,7 @@ bool afford(uint count) {
 }
 
 uint member(uint place) {
-    return deals[2u * rules[0].fly_count + cell.first + place];
+    return deals[2u * rule.fly_count + cell.first + place];
 }
 
 void store_candidate(uint slot, Candidate candidate) {
@@ -101,7 +101,7 @@ Candidate load_candidate(uint slot) {
 uint least_helpful(uint draws) {
     int least = 0x7FFFFFFF;
     uint best = 0u;
-    for (uint number = 0u; number < rules[0].victim_tournament; ++number) {
+    for (uint number = 0u; number < rule.victim_tournament; ++number) {
         uint place = chain_below(draws, SLOT_VICTIM + number, cell.count);
         int value = fitness[member(place)];
         best = value < least ? place : best;
@@ -115,7 +115,7 @@ uvec3 worst_pixel(uint draws) {
     uvec4 bounds = grid_bounds(grid, cell_number);
     int worst = -1;
     uvec3 best = uvec3(bounds.xy, 0u);
-    for (uint number = 0u; number < rules[0].place_tournament; ++number) {
+    for (uint number = 0u; number < rule.place_tournament; ++number) {
         uint bits = chain_bits(draws, SLOT_PLACE + number);
         uvec2 pixel = bounds.xy
             + uvec2(below(bits << 16, bounds.z - bounds.x), below(bits & 0xFFFF0000u, bounds.w - bounds.y));
@@ -149,13 +149,13 @@ void make_birth(inout Candidate candidate, uint place, int place_fitness, uint d
 
 void make_change(inout Candidate candidate, Fly fly, uint index, uint step, uint draws) {
     uint kind = chain_bits(draws, SLOT_KIND) & 0xFFFFu;
-    uint which = kind * rules[0].mix_total >> 16;
+    uint which = kind * rule.mix_total >> 16;
     uint side = own_side(index, local_at(fly));
-    uint edge = rules[0].edge;
-    uint turn = edge + rules[0].turn;
-    uint shift = turn + rules[0].shift;
-    uint depth = shift + rules[0].depth;
-    candidate.paint = chain_bits(draws, SLOT_RECOLOR) >> 16 < rules[0].recolor_q16 ? PAINT_ANEW : PAINT_KEEP;
+    uint edge = rule.edge;
+    uint turn = edge + rule.turn;
+    uint shift = turn + rule.shift;
+    uint depth = shift + rule.depth;
+    candidate.paint = chain_bits(draws, SLOT_RECOLOR) >> 16 < rule.recolor_q16 ? PAINT_ANEW : PAINT_KEEP;
     candidate.fly = fly;
     if (which < edge) {
         candidate.fly = edge_moved(fly, side, step, draws);
@@ -179,7 +179,7 @@ Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uin
     candidate.fly = fly;
     candidate.victim = place;
     candidate.is_valid = true;
-    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rules[0].birth_q16) {
+    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.birth_q16) {
         make_birth(candidate, place, place_fitness, draws);
     } else {
         make_change(candidate, fly, index, steps[index], draws);

@@ -38,7 +38,7 @@ Tile suit_of(Fly fly) {
         suit.mask = fly.form & 0xFFFFu;
         suit.w_inverse = inverse_of(fly.w);
         suit.h_inverse = inverse_of(fly.h);
-        suit.ring = min(rules[0].grout, min(fly.w, fly.h)) << 12;
+        suit.ring = min(rule.grout, min(fly.w, fly.h)) << 12;
     }
     return suit;
 }
@@ -69,7 +69,7 @@ int look_error(uint look, uint color, uint target, Want want) {
     if (DRESSED == 0u) {
         return difference(target, color);
     }
-    uint shown = look == LOOK_GROUT ? rules[0].grout_color : shaded(color, look);
+    uint shown = look == LOOK_GROUT ? rule.grout_color : shaded(color, look);
     return (want.is_unwanted ? UNWANTED_ERROR : difference(target, shown)) * want.weight;
 }
 

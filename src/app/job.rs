@@ -94,8 +94,8 @@ impl Job {
             dress,
             init,
         };
-        if matches!(options.scheme, SchemeOptions::Cells(_)) && job.masks().blend() == Blend::Translucent {
-            let sentence = "--scheme cells has opaque tiles only; use --scheme paper for translucent ones";
+        if job.grout.is_some() && job.masks().blend() == Blend::Translucent {
+            let sentence = "--grout: translucent tiles have no rings of grout; drop it, or use opaque masks";
             return Err(Error::Usage(sentence.to_owned()));
         }
         Ok(job)

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use super::presets::{Preset, Shaders};
 use super::values;
 use crate::error::{Error, Result};
+use crate::evolve::style::Style;
 use crate::model::{Blend, MaskSet};
 use crate::shapes::{BuiltIn, Outfit, Shader, Template, Wardrobe};
 
@@ -30,6 +31,26 @@ pub(super) struct LookArgs {
     /// Opacity of whole tiles, 0.01 to 1 [default: 1]
     #[arg(long, value_name = "A", value_parser = values::number)]
     pub opacity: Option<f64>,
+}
+
+impl LookArgs {
+    /// These flags, or the look of `style` if there are none.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there is no such shader as the style names.
+    pub(super) fn or_style(&self, style: &Style) -> Result<Self> {
+        let is_told = !self.masks.is_empty() || self.shader.is_some() || self.blend.is_some() || self.opacity.is_some();
+        if is_told || style.masks.is_empty() {
+            return Ok(self.clone());
+        }
+        let is_translucent = style.blend == Blend::Translucent;
+        Ok(Self {
+            masks: style.masks.iter().map(PathBuf::from).collect(),
+            shader: Some(style.shader.parse()?),
+            blend: Some(if is_translucent { BlendName::Translucent } else { BlendName::Opaque }),
+            opacity: is_translucent.then(|| f64::from(style.opacity) / 255.0),
+        })
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -98,14 +119,6 @@ impl Look {
         };
         let opacity = NonZeroU8::new((opacity * 255.0).round() as u8).unwrap_or(NonZeroU8::MAX);
         Ok(Self { masks, restart_masks, shader: args.shader.unwrap_or(Shader::Template), blend, opacity })
-    }
-
-    /// With these masks, if none were asked for.
-    pub(super) fn or_masks(mut self, names: &[String]) -> Self {
-        if self.masks.is_empty() {
-            self.masks = names.iter().map(PathBuf::from).collect();
-        }
-        self
     }
 
     /// Whether nothing was asked for.

@@ -119,10 +119,11 @@ impl EvolveOptions {
         let args = filled.as_ref().unwrap_or(args);
         let preset = args.preset.as_ref().and_then(PresetChoice::paper);
         let scheme = SchemeOptions::new(args, file.as_ref())?;
-        let mut look = Look::new(&args.look, &args.paper.restart_masks, preset)?;
-        if let SchemeOptions::Cells(cells) = &scheme {
-            look = look.or_masks(cells.masks());
-        }
+        let styled = match &scheme {
+            SchemeOptions::Cells(cells) => args.look.or_style(cells.style())?,
+            SchemeOptions::Paper(_) => args.look.clone(),
+        };
+        let look = Look::new(&styled, &args.paper.restart_masks, preset)?;
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
         let validation = if args.validate { Validation::On } else { Validation::Off };
         let preset_side = preset.map(|preset| u64::from(preset.side_px));

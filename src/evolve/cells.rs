@@ -1,17 +1,20 @@
 //! Drives a search in cells: rounds in epochs, and when to stop.
 //!
-//! Stops are looked at between epochs alone, so that every device ends after the same round. Nothing here knows a device or
+//! Stops are looked at between epochs, and the evals after every round that may spend them, so that every device ends after the
+//! same round. Nothing here knows a device or
 //! a clock; an [`Observer`] may.
 
 use super::evolution::StopReason;
 use crate::error::Result;
+use crate::model::cells::glaze::opacity_of;
 use crate::model::cells::{Course, Search, Standing};
 use crate::model::tile::unpack;
+use crate::model::translucency::Compositing;
 use crate::model::{Fly, Rgb};
 
 /// Version of the search: raised whenever the same picture, options and seed lead to another result.
 pub const CELLS_VERSION: u32 = 1;
-/// Rounds between two looks at the budget; after each so many, depths are spread evenly again.
+/// Rounds of an epoch; after each so many, depths are spread evenly again.
 pub const ROUNDS_PER_EPOCH: u32 = 4;
 /// Evals for each fly, unless asked otherwise: two million for the 5,000 flies of a picture of 512x512 px.
 pub const EVALS_PER_FLY: u64 = 400;
@@ -124,15 +127,7 @@ pub fn run(
             return Ok(reason);
         }
         let evals = search.standing().evals;
-        if observer.looks_at_rounds() {
-            for _ in 0..ROUNDS_PER_EPOCH {
-                search.advance(1)?;
-                observer.after_round(search)?;
-            }
-        } else {
-            search.advance(ROUNDS_PER_EPOCH)?;
-        }
-        search.renormalise()?;
+        advance(search, budget, observer)?;
         idle_epochs = if search.standing().evals == evals { idle_epochs + 1 } else { 0 };
         if idle_epochs == IDLE_EPOCHS_MAX {
             return Ok(StopReason::Dry);
@@ -141,6 +136,32 @@ pub fn run(
             return Ok(reason);
         }
     }
+}
+
+/// Makes an epoch of rounds, fewer if the evals of the budget are spent before, and spreads the depths at its end.
+///
+/// Rounds are alike in evals on every device, so it is the same round everywhere after which the budget is spent. Far from
+/// there all rounds are asked for at once, so that a device need not wait between them.
+fn advance(search: &mut dyn Search, budget: &Budget, observer: &mut dyn Observer) -> Result<()> {
+    let begun = search.standing();
+    // A round has at most this many evals: a step for each fly that a cell may hold, and each step all its candidates.
+    let rules = &search.course().rules;
+    let most = search.course().fly_count as u64 * u64::from(rules.steps_per_fly) * u64::from(rules.candidates);
+    let is_near_the_end = budget.evals.saturating_sub(begun.evals) <= most * u64::from(ROUNDS_PER_EPOCH);
+    if !observer.looks_at_rounds() && !is_near_the_end {
+        search.advance(ROUNDS_PER_EPOCH)?;
+        return search.renormalise();
+    }
+    for _ in 0..ROUNDS_PER_EPOCH {
+        search.advance(1)?;
+        if observer.looks_at_rounds() {
+            observer.after_round(search)?;
+        }
+        if search.standing().evals >= budget.evals {
+            break;
+        }
+    }
+    search.renormalise()
 }
 
 /// Why the search ends here, if it does; `mark` is where the objective had fallen by a thousandth for the last time.
@@ -189,9 +210,15 @@ pub fn sae(search: &mut dyn Search) -> Result<u64> {
     let stacks = search.read_back_stacks()?;
     let Course { target, rules, .. } = search.course();
     let ground = unpack(rules.background);
+    let is_translucent = search.course().is_translucent();
     let error = |(pixel, stack): (usize, &Vec<(u32, i32)>)| {
         if target.transparent().is_some_and(|transparent| transparent[pixel]) {
             return 0;
+        }
+        if is_translucent {
+            let mut compositing = Compositing::START;
+            stack.iter().for_each(|&(_, look)| compositing.add(opacity_of(look as u32), unpack(look as u32)));
+            return difference(target.pixels()[pixel], compositing.over(ground));
         }
         let weight = target.weights().map_or(1, |weights| u64::from(weights[pixel]));
         stack.first().map_or_else(|| difference(target.pixels()[pixel], ground), |&(_, error)| error as u64 / weight)

@@ -132,7 +132,7 @@ impl Style {
             shader: "template".to_owned(),
             blend: Blend::Opaque,
             opacity: 255,
-            recolor_q16: ONE_Q16 / 5,
+            recolor_q16: ONE_Q16 / 2,
         }
     }
 
@@ -192,6 +192,7 @@ impl Style {
             birth_min_q8: ONE_Q8,
             birth_max_q8: ONE_Q8 * 6,
             recolor_q16: ONE_Q16 * 6 / 10,
+            ground: Ground::Mean,
             masks: vec!["disc".to_owned()],
             shader: "soft".to_owned(),
             blend: Blend::Translucent,

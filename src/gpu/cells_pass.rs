@@ -70,24 +70,32 @@ impl CellShape {
 
     /// Most turns of loops that one step may take; counted as `glsl/cells.comp` and `glsl/cells_glazed.comp` do.
     fn longest_step(self, course: &Course) -> u64 {
-        let (width, height) = Plan::new(course).largest_box(&course.rules);
-        let columns = self.lanes.min(8);
-        let rows = self.lanes / columns;
-        // A box begins anywhere in a patch.
-        let (across, down) = (u64::from(width.div_ceil(columns) + 1), u64::from(height.div_ceil(rows)));
-        let turns = |inner: u64| 3 + 3 * down + across * down * (1 + inner);
+        let plan = Plan::new(course);
+        let (columns, rows) = (self.lanes.min(8), self.lanes / self.lanes.min(8));
+        let turns = |(across, down): (u64, u64), inner: u64| 3 + 3 * down + across * down * (1 + inner);
+        // A box begins anywhere in a patch; two boxes of an exchange, or the one around both, need one patch more each way.
+        let patches = |(width, height): (u32, u32), more: u64| {
+            (u64::from(width.div_ceil(columns)) + 1 + more, u64::from(height.div_ceil(rows)) + more)
+        };
         let rules = &course.rules;
+        let (width, height) = plan.largest_box(rules);
+        let (across, down) = patches((width, height), 0);
+        // Points of a lattice in a convex shape: at most its area and half the outline of its box, in cells of the lattice.
+        let side = u64::from(plan.largest_side_px(rules));
+        let own = (across * down).min(side * side / u64::from(self.lanes) + across + down + 1);
         let tournaments = u64::from(rules.births.place_tournament + rules.births.victim_tournament);
-        let batches = u64::from(rules.candidates.div_ceil(self.lanes.min(64)));
-        let making = 2 * 40 + batches * (12 + tournaments);
+        let making = 2 * 40 + u64::from(rules.candidates.div_ceil(self.lanes.min(64))) * (12 + tournaments);
+        let side = plan.cell_side_px;
+        let both = ((2 * width).min(side).min(plan.width_px), (2 * height).min(side).min(plan.height_px));
+        let exchange = |inner: u64| 3 + 3 * patches(both, 2).1 + turns(patches(both, 2), inner);
         let candidates = u64::from(rules.candidates);
         if course.is_translucent() {
-            // Four layers of a stack in a turn.
-            let both = 2 * turns(TRANSLUCENT_DEPTH as u64 / 4 + 1) + 2 * turns(0);
-            making + candidates * (8 + both + 40 + across * down) + both
-        } else {
-            making + candidates * (8 + turns(0) + 20 + 9 * across * down) + turns(0) + 2 * turns(17)
+            // A pass over both boxes with four layers of a stack in a turn, for each candidate as for the exchange.
+            let pass = exchange(TRANSLUCENT_DEPTH as u64 / 4 + 1);
+            return making + candidates * (48 + pass + own) + pass;
         }
+        let candidate = 28 + turns((across, down), 0) + 9 * own;
+        making + candidates * candidate + turns((across, down), 0) + exchange(17)
     }
 }
 

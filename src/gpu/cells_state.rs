@@ -77,6 +77,11 @@ impl Plan {
         (side.min(self.width_px), side.min(self.height_px))
     }
 
+    /// Longest side of a tile in px, with what its pixels may reach beyond.
+    pub fn largest_side_px(&self, rules: &Rules) -> u32 {
+        side_max(rules).div_ceil(UNITS_PER_PX) + 1
+    }
+
     /// Where a pixel lies in the state.
     pub fn place(&self, x: u32, y: u32) -> usize {
         let block = y / BLOCK_SIDE_PX * self.block_columns + x / BLOCK_SIDE_PX;
@@ -95,7 +100,7 @@ fn side_max(rules: &Rules) -> u32 {
     let scale = classes.iter().map(|class| class.scale_q12).max().unwrap_or(1 << 12);
     let local = if rules.bounds.local_size == 0 { 1 } else { 4 };
     let own = (u64::from(rules.side) * u64::from(scale) * local) >> 12;
-    let side = own.min(u64::from(SEARCH_SIDE_MAX)) * u64::from(rules.bounds.side_max_q8) >> 8;
+    let side = (own.min(u64::from(SEARCH_SIDE_MAX)) * u64::from(rules.bounds.side_max_q8)) >> 8;
     side.min(u64::from(SEARCH_SIDE_MAX)) as u32
 }
 

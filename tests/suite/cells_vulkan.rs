@@ -49,6 +49,10 @@ const WIDE: CellShape = CellShape { lanes: 32, form: CellForm::Wide, budget: 60_
 
 /// Goes through the rounds on both, one by one, and evens out the depths every three.
 fn check_rounds(device: &Arc<Device>, course: &Course, shape: CellShape, rounds: u32) {
+    check_named_rounds(device, ("plain", course), shape, rounds);
+}
+
+fn check_named_rounds(device: &Arc<Device>, (name, course): (&str, &Course), shape: CellShape, rounds: u32) {
     let mut twin = CpuSearch::new(course.clone());
     let mut search = VulkanSearch::with_shape(device, course.clone(), shape).expect("it fits");
     if course.rules.births.kind == BirthKind::Mutant {
@@ -60,14 +64,14 @@ fn check_rounds(device: &Arc<Device>, course: &Course, shape: CellShape, rounds:
     for round in 1..=rounds {
         twin.advance(1).expect("the twin works");
         search.advance(1).expect("the device works");
-        check_equal(&mut twin, &mut search, &format!("{shape:?} after round {round}"));
+        check_equal(&mut twin, &mut search, &format!("{name}, {shape:?} after round {round}"));
         if round % 3 == 0 {
             twin.renormalise().expect("the twin works");
             search.renormalise().expect("the device works");
-            check_equal(&mut twin, &mut search, &format!("{shape:?}, even depths after round {round}"));
+            check_equal(&mut twin, &mut search, &format!("{name}, {shape:?}, even depths after round {round}"));
         }
     }
-    assert!(twin.standing().accepted > 50, "hardly anything happened");
+    assert!(twin.standing().accepted > 50, "{name}: hardly anything happened");
 }
 
 /// Flies that mutants can come from.
@@ -187,8 +191,7 @@ fn courses() -> Vec<(&'static str, Course)> {
 fn every_rule_of_every_style_comes_to_the_twins_state() {
     canary::with_device(&DeviceOptions::default(), |device| {
         for (name, course) in courses() {
-            println!("{name}");
-            check_rounds(&device, &course, narrow(&device), 3);
+            check_named_rounds(&device, (name, &course), narrow(&device), 3);
         }
         let (_, course) = &courses()[4];
         check_rounds(&device, course, WIDE, 3);

@@ -71,19 +71,10 @@ impl<'a> Bench<'a> {
             self.paper(target, 1, format!("paper, {side_px} px"))?;
         }
         self.paper(&self.pictures.targets[1], BATCH_BIRTHS, format!("paper, {} px, by {BATCH_BIRTHS}", SIDES_PX[1]))?;
-        match self.searches() {
-            // Whoever asked for this device learns what the others do on it.
-            Err(Error::NoSuitableDevice { why }) => {
-                if verbosity > Verbosity::Quiet {
-                    report::say(&format!("smalti: no figures of the search in cells, since {why}"));
-                }
-                Ok(())
-            }
-            done => done,
-        }
+        self.searches(verbosity)
     }
 
-    fn searches(&mut self) -> Result<()> {
+    fn searches(&mut self, verbosity: Verbosity) -> Result<()> {
         let mut formed: Option<(&str, usize, Vec<Fly>)> = None;
         for (name, candidates, size) in SEARCHES {
             let style = named(name)?;
@@ -92,10 +83,28 @@ impl<'a> Bench<'a> {
                 Some((style, of, flies)) if (style, of) == (name, size) => flies,
                 _ => form(&self.pictures.targets[size], &style)?,
             };
-            self.search(format!("cells {name}, K={candidates}, {} px", SIDES_PX[size]), course, &flies)?;
+            let row = format!("cells {name}, K={candidates}, {} px", SIDES_PX[size]);
+            let done = self.search(row.clone(), course, &flies);
+            self.unless_unable(done, &row, verbosity)?;
             formed = Some((name, size, flies));
         }
-        self.picture()
+        let row = format!("picture, {} px", SIDES_PX[1]);
+        let done = self.picture(row.clone());
+        self.unless_unable(done, &row, verbosity)
+    }
+
+    /// A device that cannot make a search has no figures of it; whoever asked for it learns what the others are.
+    fn unless_unable(&mut self, done: Result<()>, row: &str, verbosity: Verbosity) -> Result<()> {
+        match done {
+            Err(error @ (Error::NoSuitableDevice { .. } | Error::TooLarge(_))) => {
+                if verbosity > Verbosity::Quiet {
+                    report::say(&format!("smalti: no figures of {row}: {error}"));
+                }
+                self.note([]);
+                Ok(())
+            }
+            done => done,
+        }
     }
 
     /// Takes in figures, and shows how far it has come.
@@ -170,13 +179,13 @@ impl<'a> Bench<'a> {
     }
 
     /// Makes whole pictures, as far as the time allows.
-    fn picture(&mut self) -> Result<()> {
+    fn picture(&mut self, row: String) -> Result<()> {
         let began = Instant::now();
         let mut laps = Vec::new();
         while laps.is_empty() || began.elapsed() < self.budget {
             laps.push((self.make_picture()?, 1));
         }
-        self.note([Measurement::of(format!("picture, {} px", SIDES_PX[1]), Unit::PicturesPerHour, &laps)]);
+        self.note([Measurement::of(row, Unit::PicturesPerHour, &laps)]);
         Ok(())
     }
 

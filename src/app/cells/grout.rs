@@ -65,13 +65,14 @@ impl GroutChoice {
         }
         let color = match self.color {
             Some(GroutColor::This(color)) => color,
-            _ => mean_color(target),
+            _ => mean_color(target).map(|channel| ((u32::from(channel) * 3 + 2) / 4) as u8),
         };
         Some(Grout { width: self.width.unwrap_or_else(|| ((side * usual_q8) >> 8).max(1)), color })
     }
 }
 
-/// The mean colour where tiles are wanted, rounded half up: grout in it keeps the brightness of the whole.
+/// The mean colour where tiles are wanted, rounded half up. Grout a quarter darker than that parts the tiles everywhere, and takes
+/// hardly 2 % of the whole's brightness.
 pub(super) fn mean_color(target: &Target) -> Rgb {
     let is_wanted = |place: usize| target.transparent().is_none_or(|transparent| !transparent[place]);
     let (mut sums, mut count) = ([0_u64; 3], 0_u64);
@@ -96,10 +97,10 @@ mod tests {
             GroutChoice::new(color, width).expect("it is in range").of(usual_q8, 640, &target())
         };
         assert_eq!(of(None, None, 0), None);
-        assert_eq!(of(None, None, 16), Some(Grout { width: 40, color: [1, 15, 255] }));
+        assert_eq!(of(None, None, 16), Some(Grout { width: 40, color: [1, 11, 191] }));
         assert_eq!(of(Some(GroutColor::Auto), None, 0), of(None, None, 16));
         assert_eq!(of(Some(GroutColor::None), None, 16), None);
-        assert_eq!(of(None, Some(1.5), 0), Some(Grout { width: 96, color: [1, 15, 255] }));
+        assert_eq!(of(None, Some(1.5), 0), Some(Grout { width: 96, color: [1, 11, 191] }));
         assert_eq!(of(Some(GroutColor::This([9; 3])), Some(0.02), 16), Some(Grout { width: 1, color: [9; 3] }));
     }
 

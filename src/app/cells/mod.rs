@@ -105,9 +105,9 @@ impl CellsOptions {
         })
     }
 
-    /// The masks that the style's tiles wear unless others are asked for.
-    pub(super) fn masks(&self) -> &[String] {
-        &self.style.masks
+    /// The style.
+    pub(super) fn style(&self) -> &Style {
+        &self.style
     }
 
     /// When the search of so many flies ends.
@@ -222,6 +222,7 @@ fn style_told(style: &Style) -> Value {
         "turn": style.turn,
         "angle_spread": style.angle_spread,
         "coherence": style.coherence,
+        "recolor_q16": style.recolor_q16,
         "flow_q8": guide,
         "classes": classes,
     })

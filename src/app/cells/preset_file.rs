@@ -16,6 +16,7 @@ use crate::app::values;
 use crate::error::{Error, Result};
 use crate::evolve::style::{ClassStyle, Ground, GuideKind, Style};
 use crate::model::cells::rules::CLASSES_MAX;
+use crate::shapes::Shader;
 
 /// Fixed-point one of lengths over d.
 const ONE_Q8: f64 = 256.0;
@@ -35,6 +36,8 @@ pub(in crate::app) struct PresetFile {
     color_mode: Option<ColorModeName>,
     background: Typed<crate::model::Rgb>,
     masks: Vec<PathBuf>,
+    shader: Typed<Shader>,
+    opacity: Option<Share>,
     grout: Typed<GroutColor>,
     grout_width: Option<Length>,
     side: Option<[Length; 2]>,
@@ -47,6 +50,7 @@ pub(in crate::app) struct PresetFile {
     turn: Option<Cost>,
     angle_spread_deg: Option<Degrees>,
     coherence: Option<u8>,
+    recolor: Option<Share>,
     guide: Option<GuideName>,
     smoothing: Option<Length>,
     size_strength: Option<Share>,
@@ -108,6 +112,12 @@ impl FromText for values::ColorCount {
 impl FromText for crate::model::Rgb {
     fn from_text(text: &str) -> Result<Self, String> {
         values::color(text)
+    }
+}
+
+impl FromText for Shader {
+    fn from_text(text: &str) -> Result<Self, String> {
+        text.parse().map_err(|error: Error| error.to_string())
     }
 }
 
@@ -236,6 +246,8 @@ impl PresetFile {
         if args.look.masks.is_empty() {
             args.look.masks.clone_from(&self.masks);
         }
+        args.look.shader = args.look.shader.or(self.shader.0);
+        args.look.opacity = args.look.opacity.or(self.opacity.map(|share| f64::from(share.0) / 65_536.0));
         args.cells.grout = args.cells.grout.or(self.grout.0);
         args
     }
@@ -255,6 +267,7 @@ impl PresetFile {
         set(&mut style.angle_spread, self.angle_spread_deg.map(|spread| spread.0));
         set(&mut style.coherence, self.coherence.map(u32::from));
         set(&mut style.grout_q8, self.grout_width.map(|width| width.0));
+        set(&mut style.recolor_q16, self.recolor.map(|share| share.0));
         style.is_stroke = self.stroke.unwrap_or(style.is_stroke);
         style.ground = match self.ground {
             Some(GroundName::Black) => Ground::Black,

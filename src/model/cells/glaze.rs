@@ -122,10 +122,9 @@ mod tests {
 
     #[test]
     fn a_shade_asks_for_a_brighter_colour() {
-        let share = i64::from(share_q8(CLEAR, 128));
-        let lacks = [100, 200, 0].map(|target| share * i64::from(lack_q6(target, 0)));
+        let share = i64::from(share_q8(CLEAR, 51));
+        let lacks = [20, 60, 0].map(|target| share * i64::from(lack_q6(target, 0)));
         let color = Fit { lacks, squares: share * share }.color().expect("it shows");
-        assert_eq!(color & 255, 199);
-        assert_eq!(color >> 8 & 255, 255);
+        assert_eq!(color, pack([100, 255, 0]));
     }
 }
