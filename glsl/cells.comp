@@ -54,197 +54,12 @@ layout(push_constant) uniform Push {
 
 #include "shared/cells_operators.glsl"
 
-const uint PAINT_KEEP = 0u;
-const uint PAINT_ANEW = 1u;
-const uint PAINT_BIRTH = 2u;
-const uint COLOR_MEDIAN = 0u;
-const uint COLOR_MEAN = 1u;
-const uint COLOR_PICK = 2u;
-const uint COLOR_EVOLVED = 3u;
-
-struct Candidate {
-    Fly fly;
-    // Place among the members, and index.
-    uint victim;
-    uint index;
-    uint paint;
-    bool is_valid;
-    // Whether it differs from its victim in colour at most, and the victim's colour.
-    bool is_same;
-    uint old_rg;
-    uint old_ba;
-    // Fitness of the victim, and what the child costs besides its pixels.
-    int own;
-};
-
-const uint CANDIDATE_WORDS = 13u;
-const uint BATCH = LANES < 64u ? LANES : 64u;
-shared uint shared_candidates[BATCH * CANDIDATE_WORDS];
-
-// What loops cost besides their turns: a loop that software Vulkan passes costs the turn that ends it, even where no invocation
-// enters it.
-const uint STEP_TURNS = 40u;
-const uint BATCH_TURNS = 12u;
-const uint CANDIDATE_TURNS = 8u;
-
-// The cell at work; the same in all invocations.
-uint cell_number;
-CellRecord cell;
-Grid grid;
-uint turns;
-bool is_over;
-
-// Whether so many turns of loops still fit the budget; then they are spent.
-bool afford(uint count) {
-    is_over = is_over || turns + count > push.budget;
-    turns += is_over ? 0u : count;
-    return !is_over;
+// Marginal fitness tells what goes with a victim, its penalty included.
+int without_victim(uint index, Fly victim) {
+    return fitness[index];
 }
 
-uint member(uint place) {
-    return deals[2u * rule.fly_count + cell.first + place];
-}
-
-void store_candidate(uint slot, Candidate candidate) {
-    uint first = slot * CANDIDATE_WORDS;
-    shared_candidates[first] = uint(candidate.fly.x);
-    shared_candidates[first + 1u] = uint(candidate.fly.y);
-    shared_candidates[first + 2u] = candidate.fly.z;
-    shared_candidates[first + 3u] = candidate.fly.rg;
-    shared_candidates[first + 4u] = candidate.fly.ba;
-    shared_candidates[first + 5u] = candidate.fly.w;
-    shared_candidates[first + 6u] = candidate.fly.h;
-    shared_candidates[first + 7u] = candidate.fly.form;
-    shared_candidates[first + 8u] = candidate.victim;
-    shared_candidates[first + 9u] =
-        candidate.paint | (candidate.is_valid ? 4u : 0u) | (candidate.is_same ? 8u : 0u) | candidate.index << 4;
-    shared_candidates[first + 10u] = candidate.old_rg;
-    shared_candidates[first + 11u] = candidate.old_ba;
-    shared_candidates[first + 12u] = uint(candidate.own);
-}
-
-Candidate load_candidate(uint slot) {
-    uint first = slot * CANDIDATE_WORDS;
-    Candidate candidate;
-    candidate.fly = Fly(
-        int(shared_candidates[first]), int(shared_candidates[first + 1u]), shared_candidates[first + 2u],
-        shared_candidates[first + 3u], shared_candidates[first + 4u], shared_candidates[first + 5u],
-        shared_candidates[first + 6u], shared_candidates[first + 7u]
-    );
-    candidate.victim = shared_candidates[first + 8u];
-    uint flags = shared_candidates[first + 9u];
-    candidate.paint = flags & 3u;
-    candidate.is_valid = (flags & 4u) != 0u;
-    candidate.is_same = (flags & 8u) != 0u;
-    candidate.index = flags >> 4;
-    candidate.old_rg = shared_candidates[first + 10u];
-    candidate.old_ba = shared_candidates[first + 11u];
-    candidate.own = int(shared_candidates[first + 12u]);
-    return candidate;
-}
-
-// Place of the least helpful of some random flies of the cell.
-uint least_helpful(uint draws) {
-    int least = 0x7FFFFFFF;
-    uint best = 0u;
-    for (uint number = 0u; number < rule.victim_tournament; ++number) {
-        uint place = chain_below(draws, SLOT_VICTIM + number, cell.count);
-        int value = fitness[member(place)];
-        best = value < least ? place : best;
-        least = min(value, least);
-    }
-    return best;
-}
-
-// The worst of some random pixels of the cell, and the depth of what shows there.
-uvec3 worst_pixel(uint draws) {
-    uvec4 bounds = grid_bounds(grid, cell_number);
-    int worst = -1;
-    uvec3 best = uvec3(bounds.xy, 0u);
-    for (uint number = 0u; number < rule.place_tournament; ++number) {
-        uint bits = chain_bits(draws, SLOT_PLACE + number);
-        uvec2 pixel = bounds.xy
-            + uvec2(below(bits << 16, bounds.z - bounds.x), below(bits & 0xFFFF0000u, bounds.w - bounds.y));
-        uvec4 shown = pixels[2u * pixel_place(pixel)];
-        best = int(shown.w) > worst ? uvec3(pixel, shown.z & TOP_Z_MASK) : best;
-        worst = max(int(shown.w), worst);
-    }
-    return best;
-}
-
-GuideSample local_at(Fly fly) {
-    return guide_at(ivec2(fly.x, fly.y) >> 6);
-}
-
-void make_birth(inout Candidate candidate, uint place, int place_fitness, uint draws) {
-    candidate.paint = PAINT_BIRTH;
-    uint helpless = least_helpful(draws);
-    candidate.victim = place_fitness <= 0 ? place : helpless;
-    uint index = member(candidate.victim);
-    if (MUTANTS == 1u) {
-        uint parent = member(chain_below(draws, SLOT_PLACE, cell.count));
-        candidate.is_valid = fitness[parent] > 0;
-        Fly fly = flies[parent];
-        candidate.fly = mutant(fly, own_side(index, local_at(fly)), draws);
-    } else {
-        uvec3 worst = worst_pixel(draws);
-        GuideSample local = guide_at(ivec2(worst.xy));
-        candidate.fly = newborn(own_side(index, local), worst.xy, worst.z, local, draws);
-    }
-}
-
-void make_change(inout Candidate candidate, Fly fly, uint index, uint step, uint draws) {
-    uint kind = chain_bits(draws, SLOT_KIND) & 0xFFFFu;
-    uint which = kind * rule.mix_total >> 16;
-    uint side = own_side(index, local_at(fly));
-    uint edge = rule.edge;
-    uint turn = edge + rule.turn;
-    uint shift = turn + rule.shift;
-    uint depth = shift + rule.depth;
-    candidate.paint = chain_bits(draws, SLOT_RECOLOR) >> 16 < rule.recolor_q16 ? PAINT_ANEW : PAINT_KEEP;
-    candidate.fly = fly;
-    if (which < edge) {
-        candidate.fly = edge_moved(fly, side, step, draws);
-    } else if (which < turn) {
-        candidate.fly = turned(fly, step, draws);
-    } else if (which < shift) {
-        candidate.fly = shifted(fly, side, step, draws);
-    } else if (which < depth) {
-        candidate.fly = raised(fly, step, draws);
-    } else {
-        candidate.paint = PAINT_ANEW;
-    }
-    if (COLOR_SOURCE == COLOR_EVOLVED && candidate.paint == PAINT_ANEW) {
-        candidate.fly = repainted(candidate.fly, step, draws);
-    }
-}
-
-// Makes a child of the fly at a place among the members, or a birth, and says whether it is within its cell.
-Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uint draws) {
-    Candidate candidate;
-    candidate.fly = fly;
-    candidate.victim = place;
-    candidate.is_valid = true;
-    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.birth_q16) {
-        make_birth(candidate, place, place_fitness, draws);
-    } else {
-        make_change(candidate, fly, index, steps[index], draws);
-    }
-    candidate.index = member(candidate.victim);
-    Fly old = flies[candidate.index];
-    GuideSample local = local_at(candidate.fly);
-    bound_sides(candidate.fly, own_side(candidate.index, local));
-    Fly child = candidate.fly;
-    candidate.old_rg = old.rg;
-    candidate.old_ba = old.ba;
-    candidate.is_same = child.x == old.x && child.y == old.y && child.z == old.z && child.w == old.w && child.h == old.h
-        && child.form == old.form && fly_angle(child) == fly_angle(old);
-    bool is_kept = candidate.paint == PAINT_KEEP && candidate.is_same && child.rg == old.rg && child.ba == old.ba;
-    candidate.is_valid = candidate.is_valid && !is_kept
-        && grid_cell_of(grid, footprint_of(child, grid.size).box) == cell_number;
-    candidate.own = fitness[candidate.index] + turn_penalty(child, local);
-    return candidate;
-}
+#include "shared/cells_steps.glsl"
 
 // What a child would do to the pixels of its box.
 struct Seen {
@@ -405,7 +220,10 @@ bool evaluate(Candidate candidate, inout Best best) {
         }
         uint color = found_color(candidate.fly, seen);
         change += scratch_error(color, seen.own_count);
-        set_color(candidate.fly, color);
+        // A colour of 16 bits stays as it is where it is the same in 8.
+        if (color != fly_color(candidate.fly)) {
+            set_color(candidate.fly, color);
+        }
         if (!seen.is_shown && candidate.paint == PAINT_BIRTH) {
             return false;
         }
@@ -534,15 +352,6 @@ uint exchange_pixel(Exchange change, uint place, uint look) {
     return depth;
 }
 
-// The boxes to go through: the union of both, or one after the other where they are apart.
-void exchange_boxes(Exchange change, out ivec4 boxes[2]) {
-    ivec4 old = change.old.box;
-    ivec4 new = change.new.box;
-    bool is_apart = old.x > old.z || new.x > new.z || old.z < new.x || new.z < old.x || old.w < new.y || new.w < old.y;
-    boxes[0] = is_apart ? old : ivec4(min(old.xy, new.xy), max(old.zw, new.zw));
-    boxes[1] = is_apart ? new : ivec4(1, 1, 0, 0);
-}
-
 // Takes the fly off the pixels of its old footprint and puts it on those of its new one.
 void exchange(Exchange change, ivec4 boxes[2]) {
     ivec2 offset = lane_offset();
@@ -572,24 +381,6 @@ void exchange(Exchange change, ivec4 boxes[2]) {
     if (subgroupElect()) {
         add_fitness(change.fly, -covered * int(rule.overlap));
     }
-}
-
-// Adds a number with a sign to one of 64 bits in two words.
-void add_wide(inout uvec2 sum, int amount) {
-    uint carry;
-    sum.x = uaddCarry(sum.x, uint(amount), carry);
-    sum.y += uint(amount >> 31) + carry;
-}
-
-void add_to_header(uvec2 evals, uvec2 births, uvec2 accepted, uvec2 change) {
-    uint old = atomicAdd(header[0].evals_low, evals.x);
-    atomicAdd(header[0].evals_high, evals.y + (old + evals.x < old ? 1u : 0u));
-    old = atomicAdd(header[0].births_low, births.x);
-    atomicAdd(header[0].births_high, births.y + (old + births.x < old ? 1u : 0u));
-    old = atomicAdd(header[0].accepted_low, accepted.x);
-    atomicAdd(header[0].accepted_high, accepted.y + (old + accepted.x < old ? 1u : 0u));
-    old = atomicAdd(header[0].change_low, change.x);
-    atomicAdd(header[0].change_high, change.y + (old + change.x < old ? 1u : 0u));
 }
 
 void main() {
@@ -677,7 +468,7 @@ void main() {
                 changed, child.z, color, footprint_of(old, grid.size), footprint_of(child, grid.size), suit_of(old),
                 suit_of(child), is_kept
             );
-            exchange_boxes(change, boxes);
+            union_boxes(change.old.box, change.new.box, boxes);
             uint most = patch_turns(boxes[0], STACK_DEPTH + 1u) + patch_turns(boxes[1], STACK_DEPTH + 1u);
             is_over = is_over || turns + most > push.budget;
         }

@@ -73,7 +73,7 @@ uint longest(uint other, uint low, uint high) {
 
 // `fly` with its sides within the bounds of a fly of this own side.
 void bound_sides(inout Fly fly, uint side) {
-    uint low = max(side * rule.side_min_q8 >> 8, SIDE_MIN);
+    uint low = clamp(side * rule.side_min_q8 >> 8, SIDE_MIN, SEARCH_SIDE_MAX);
     uint high = clamp(side * rule.side_max_q8 >> 8, low, SEARCH_SIDE_MAX);
     uint w = clamp(fly.w, low, high);
     uint h = clamp(fly.h, low, high);
@@ -162,7 +162,7 @@ Fly newborn(uint side, uvec2 pixel, uint shown_z, GuideSample local, uint draws)
     int log_w = rule.side_low + int(chain_below(draws, SLOT_OPERATOR, range));
     int log_h = rule.side_low + int(chain_below(draws, SLOT_OPERATOR + 1u, range));
     log_h = clamp(log_h, log_w - rule.aspect_high, log_w + rule.aspect_high);
-    if (rules[0].is_stroke != 0u) {
+    if (rule.is_stroke != 0u) {
         int longer = max(log_w, log_h);
         log_h = min(log_w, log_h);
         log_w = longer;
@@ -196,7 +196,7 @@ int turn_penalty(Fly fly, GuideSample local) {
     }
     uint deviation = (fly_angle(fly) - local.direction + 8192u & 16383u) - 8192u;
     uint squared = deviation * deviation >> 18;
-    uint area = (fly.w >> 4) * (fly.h >> 4);
+    uint area = min((fly.w >> 4) * (fly.h >> 4), (1u << 24) - 1u);
     return int((area * squared >> 12) * rule.turn_penalty);
 }
 

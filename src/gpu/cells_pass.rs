@@ -1,13 +1,15 @@
-//! The compute passes of a cells search: deal, scan, scatter, sort, then the steps of all cells. Twin: `cpu/cells/`.
+//! The compute passes of a cells search: deal, scan, scatter, sort, then the steps of all cells, and among
+//! translucent tiles marginal fitness. Twin: `cpu/cells/`.
 
 use std::sync::Arc;
 
 use super::cells_layout::{CellRecord, CellsPush, FlyRecord, SearchHeader, SearchRules};
-use super::cells_state::{PIXEL_WORDS, Plan, STACK_WORDS, rules_record};
+use super::cells_state::{PIXEL_WORDS, Plan, rules_record};
 use super::evaluate_pass::create_mask_buffer;
 use super::shaders;
 use crate::error::{Error, Result};
 use crate::model::cells::Course;
+use crate::model::cells::pixel::TRANSLUCENT_DEPTH;
 use crate::model::cells::rules::{BirthDepth, BirthKind};
 use crate::model::tables;
 use crate::vk::{
@@ -66,7 +68,7 @@ impl CellShape {
         })
     }
 
-    /// Most turns of loops that one step may take; counted as `glsl/cells.comp` does.
+    /// Most turns of loops that one step may take; counted as `glsl/cells.comp` and `glsl/cells_glazed.comp` do.
     fn longest_step(self, course: &Course) -> u64 {
         let plan = Plan::new(course);
         let (columns, rows) = (self.lanes.min(8), self.lanes / self.lanes.min(8));
@@ -81,13 +83,19 @@ impl CellShape {
         // Points of a lattice in a convex shape: at most its area and half the outline of its box, in cells of the lattice.
         let side = u64::from(plan.largest_side_px(rules));
         let own = (across * down).min(side * side / u64::from(self.lanes) + across + down + 1);
-        let candidate = 28 + turns((across, down), 0) + 9 * own;
         let tournaments = u64::from(rules.births.place_tournament + rules.births.victim_tournament);
         let making = 2 * 40 + u64::from(rules.candidates.div_ceil(self.lanes.min(64))) * (12 + tournaments);
         let side = plan.cell_side_px;
         let both = ((2 * width).min(side).min(plan.width_px), (2 * height).min(side).min(plan.height_px));
-        let exchange = 3 + 3 * patches(both, 2).1 + turns(patches(both, 2), 17);
-        making + u64::from(rules.candidates) * candidate + turns((across, down), 0) + exchange
+        let exchange = |inner: u64| 3 + 3 * patches(both, 2).1 + turns(patches(both, 2), inner);
+        let candidates = u64::from(rules.candidates);
+        if course.is_translucent() {
+            // A pass over both boxes with four layers of a stack in a turn, for each candidate as for the exchange.
+            let pass = exchange(TRANSLUCENT_DEPTH as u64 / 4 + 1);
+            return making + candidates * (48 + pass + own) + pass;
+        }
+        let candidate = 28 + turns((across, down), 0) + 9 * own;
+        making + candidates * candidate + turns((across, down), 0) + exchange(17)
     }
 }
 
@@ -115,18 +123,26 @@ struct Sizes {
     scratch_words: u32,
 }
 
+/// The pipelines of a round, in their order.
+struct Pipelines {
+    deal: Arc<ComputePipeline>,
+    scan: Arc<ComputePipeline>,
+    scatter: Arc<ComputePipeline>,
+    sort: Arc<ComputePipeline>,
+    cells: Arc<ComputePipeline>,
+    /// What begins marginal fitness fly by fly and adds to it pixel by pixel, if the cells do not bring it up to date.
+    fitness: Option<[Arc<ComputePipeline>; 2]>,
+}
+
 /// Pipelines and buffers of a search.
 pub(super) struct CellsPass {
     pub buffers: CellBuffers,
     budget: u32,
     fly_groups: u32,
     cell_count: u32,
+    block_count: u32,
     workgroups_per_row: u32,
-    deal: Arc<ComputePipeline>,
-    scan: Arc<ComputePipeline>,
-    scatter: Arc<ComputePipeline>,
-    sort: Arc<ComputePipeline>,
-    cells: Arc<ComputePipeline>,
+    pipelines: Pipelines,
     group: Arc<BindingGroup>,
 }
 
@@ -143,24 +159,23 @@ impl CellsPass {
         let plan = Plan::new(course);
         let rows = shape.lanes / shape.lanes.min(8);
         let side = plan.cell_side_px;
-        let words = if course.is_plain() { 1 } else { 2 };
+        let words = match course.is_translucent() {
+            true => 4,
+            false => 1 + u32::from(!course.is_plain()),
+        };
         let scratch_words = words * side.min(plan.block_columns * 8) * (side.min(plan.height_px) + rows);
         let buffers = CellBuffers::create(device, recorder, course, &Sizes { plan, scratch_words })?;
         buffers.upload(recorder, course, &rules_record(course, &plan, scratch_words))?;
-        let whole = |name, module| create_pipeline(device, name, module, &[]);
-        let cells = create_pipeline(device, "cells", shaders::CELLS, &specialization(course, shape))?;
-        let group = buffers.bind(&cells)?;
+        let pipelines = Pipelines::create(device, course, shape)?;
+        let group = buffers.bind(&pipelines.cells)?;
         Ok(Self {
             buffers,
             budget: shape.budget,
             fly_groups: (course.fly_count as u32).div_ceil(FLIES_PER_GROUP).max(1),
             cell_count: plan.cell_count,
+            block_count: plan.block_columns * plan.block_rows,
             workgroups_per_row: info.limits.workgroups[0],
-            deal: whole("cells_deal", shaders::CELLS_DEAL)?,
-            scan: whole("cells_scan", shaders::CELLS_SCAN)?,
-            scatter: whole("cells_scatter", shaders::CELLS_SCATTER)?,
-            sort: whole("cells_sort", shaders::CELLS_SORT)?,
-            cells,
+            pipelines,
             group,
         })
     }
@@ -168,15 +183,20 @@ impl CellsPass {
     /// Records so many iterations: each begins a round unless one is under way, and takes each cell as far as the budget allows.
     pub fn record(&self, recorder: &mut Recorder, iterations: u32) -> Result<()> {
         let push = CellsPush { budget: self.budget };
+        let Pipelines { deal, scan, scatter, sort, cells, fitness } = &self.pipelines;
+        let mut stages = vec![
+            (deal, self.fly_groups),
+            (scan, 1),
+            (scatter, self.fly_groups),
+            (sort, self.fly_groups),
+            (cells, self.cell_count),
+        ];
+        if let Some([of_flies, of_pixels]) = fitness {
+            stages.extend([(of_flies, self.fly_groups), (of_pixels, self.block_count)]);
+        }
         let mut pass = recorder.compute_pass("cells")?;
         for _ in 0..iterations {
-            for (pipeline, count) in [
-                (&self.deal, self.fly_groups),
-                (&self.scan, 1),
-                (&self.scatter, self.fly_groups),
-                (&self.sort, self.fly_groups),
-                (&self.cells, self.cell_count),
-            ] {
+            for &(pipeline, count) in &stages {
                 pass.bind(pipeline, &self.group);
                 pass.push_constants(bytemuck::bytes_of(&push));
                 self.dispatch(&mut pass, count);
@@ -197,8 +217,28 @@ impl CellsPass {
     }
 }
 
-/// The specialisation constants of `glsl/cells.comp`.
-fn specialization(course: &Course, shape: CellShape) -> [(u32, u32); 8] {
+impl Pipelines {
+    fn create(device: &Arc<Device>, course: &Course, shape: CellShape) -> Result<Self> {
+        let constants = specialization(course, shape);
+        let create = |name, module, constants: &[(u32, u32)]| create_pipeline(device, name, module, constants);
+        let fitness =
+            |part: u32| create("cells_fitness", shaders::CELLS_FITNESS, &[&constants[..], &[(9, part)]].concat());
+        let is_translucent = course.is_translucent();
+        let (name, module) =
+            if is_translucent { ("cells_glazed", shaders::CELLS_GLAZED) } else { ("cells", shaders::CELLS) };
+        Ok(Self {
+            deal: create("cells_deal", shaders::CELLS_DEAL, &[])?,
+            scan: create("cells_scan", shaders::CELLS_SCAN, &[])?,
+            scatter: create("cells_scatter", shaders::CELLS_SCATTER, &[])?,
+            sort: create("cells_sort", shaders::CELLS_SORT, &[])?,
+            cells: create(name, module, &constants)?,
+            fitness: if is_translucent { Some([fitness(0)?, fitness(1)?]) } else { None },
+        })
+    }
+}
+
+/// The specialisation constants of `glsl/cells.comp` and `glsl/cells_glazed.comp`.
+fn specialization(course: &Course, shape: CellShape) -> [(u32, u32); 9] {
     let rules = &course.rules;
     [
         (0, shape.lanes),
@@ -209,6 +249,7 @@ fn specialization(course: &Course, shape: CellShape) -> [(u32, u32); 8] {
         (5, u32::from(rules.penalties.turn > 0)),
         (6, u32::from(rules.bounds.local_size != 0)),
         (7, u32::from(!course.is_plain())),
+        (8, rules.background),
     ]
 }
 
@@ -248,7 +289,7 @@ impl CellBuffers {
             steps: storage("steps", flies * 4)?,
             fitness: storage("marginal fitness", flies * 4)?,
             guide: storage("guide", course.guide.samples.len() * 8)?,
-            stacks: storage("stacks", plan.pixel_count() * STACK_WORDS * 4)?,
+            stacks: storage("stacks", plan.stack_words() * 4)?,
             scratch: storage("shown pixels", cells * scratch_words as usize * 4)?,
             masks: create_mask_buffer(device, recorder, std::iter::once(&*course.masks))?,
         })

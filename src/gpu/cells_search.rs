@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::cells_layout::{CellRecord, FlyRecord, SearchHeader};
 use super::cells_pass::{CellShape, CellsPass};
-use super::cells_state::{self, PIXEL_WORDS, Plan, STACK_WORDS};
+use super::cells_state::{self, PIXEL_WORDS, Plan};
 use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
 use crate::model::Fly;
@@ -166,7 +166,7 @@ impl Search for VulkanSearch {
     fn read_back_stacks(&mut self) -> Result<Stacks> {
         let pixels = self.read_pixels()?;
         let buffer = Arc::clone(&self.pass.buffers.stacks);
-        let words: Vec<u32> = self.read(&buffer, self.plan.pixel_count() * STACK_WORDS)?;
+        let words: Vec<u32> = self.read(&buffer, self.plan.stack_words())?;
         Ok(cells_state::stacks(&self.plan, &pixels, &words))
     }
 }

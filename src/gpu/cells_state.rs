@@ -2,20 +2,20 @@
 
 use super::cells_layout::{FlyRecord, SearchRules};
 use crate::error::{Error, Result};
+use crate::model::cells::glaze::opacity_of;
 use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
-use crate::model::cells::pixel::{BACKGROUND_Z, STACK_DEPTH, difference};
+use crate::model::cells::pixel::{BACKGROUND_Z, STACK_DEPTH, TRANSLUCENT_DEPTH, UNWANTED_ERROR, difference};
 use crate::model::cells::rules::{Acceptance, CLASSES_MAX, SEARCH_SIDE_MAX};
 use crate::model::cells::{Course, Rules, Stacks};
 use crate::model::fly::UNITS_PER_PX;
-use crate::model::tile::pack;
-use crate::model::{Blend, Fly, NO_FLY};
+use crate::model::tile::{pack, unpack};
+use crate::model::translucency::{CLEAR, Compositing};
+use crate::model::{Fly, NO_FLY};
 
 /// Pixels of a block.
 const BLOCK_PIXELS: usize = (BLOCK_SIDE_PX * BLOCK_SIDE_PX) as usize;
 /// Words of a pixel: two words of four.
 pub(super) const PIXEL_WORDS: usize = 8;
-/// Words of a pixel's stack: a fly and its error for each place.
-pub(super) const STACK_WORDS: usize = 2 * STACK_DEPTH;
 /// The bits of a layer's third word that hold its depth; those above hold a pixel's weight less 1, and whether it wants no tile.
 const DEPTH_MASK: u32 = (1 << WEIGHT_SHIFT) - 1;
 const WEIGHT_SHIFT: u32 = 25;
@@ -33,6 +33,8 @@ pub(super) struct Plan {
     pub cell_side_px: u32,
     /// Most cells of a round.
     pub cell_count: u32,
+    /// Most flies on a pixel.
+    stack_depth: usize,
 }
 
 impl Plan {
@@ -48,12 +50,23 @@ impl Plan {
             block_rows: height_px.div_ceil(BLOCK_SIDE_PX),
             cell_side_px: side,
             cell_count: most(width_px) * most(height_px),
+            stack_depth: if course.is_translucent() { TRANSLUCENT_DEPTH } else { STACK_DEPTH },
         }
     }
 
     /// Pixels of all blocks.
     pub fn pixel_count(&self) -> usize {
         self.block_columns as usize * self.block_rows as usize * BLOCK_PIXELS
+    }
+
+    /// Words of the stacks of all pixels: a fly and its error, or its look, for each place.
+    pub fn stack_words(&self) -> usize {
+        self.pixel_count() * self.stack_depth * 2
+    }
+
+    /// The first word of an entry: in each block first the nearest flies of all pixels, then the next ones.
+    fn stack_word(&self, place: usize, entry: usize) -> usize {
+        (place / BLOCK_PIXELS * self.stack_depth + entry) * 2 * BLOCK_PIXELS + place % BLOCK_PIXELS * 2
     }
 
     /// Columns and rows of the largest box of a child in px.
@@ -93,12 +106,7 @@ fn side_max(rules: &Rules) -> u32 {
 
 /// Refuses what would not fit the 32 bits of fitness and changes, or of indices.
 pub(super) fn check(course: &Course) -> Result<()> {
-    let Course { rules, target, masks, .. } = course;
-    if masks.blend() == Blend::Translucent {
-        return Err(Error::NoSuitableDevice {
-            why: "a Vulkan device does not search with translucent masks; use --device cpu".to_owned(),
-        });
-    }
+    let Course { rules, target, .. } = course;
     let side_px = u64::from(side_max(rules).div_ceil(UNITS_PER_PX)) + 2;
     let pixels = (side_px * side_px).min(u64::from(target.width_px()) * u64::from(target.height_px()));
     let penalties = &rules.penalties;
@@ -111,10 +119,30 @@ pub(super) fn check(course: &Course) -> Result<()> {
             "a tile may cover {pixels} pixels with an error of up to {most} each, which does not fit the 32 bits of a Vulkan device; use more --tiles, a smaller --size, or --device cpu"
         )));
     }
+    check_gains(course)?;
     if course.fly_count >= FLY_COUNT_MAX {
         return Err(Error::TooLarge(format!(
             "{} tiles are more than a Vulkan device searches; use fewer --tiles, or --device cpu",
             course.fly_count
+        )));
+    }
+    Ok(())
+}
+
+/// Refuses a translucent search in which the gains of one fly in a round might not fit 32 bits: it may take its place anew in each step,
+/// and until the round is over its marginal fitness is what it had, with all that it gained.
+fn check_gains(course: &Course) -> Result<()> {
+    let target = &course.target;
+    let side = u64::from(cell_side_px(course.rules.side));
+    let pixels = u64::from(target.width_px()) * u64::from(target.height_px());
+    let (weight, all) = target.weights().map_or((1, pixels), |weights| {
+        let most = weights.iter().copied().max().unwrap_or(1);
+        (u64::from(most), weights.iter().map(|&weight| u64::from(weight)).sum())
+    });
+    let most = all.min(side * side * weight) * UNWANTED_ERROR as u64;
+    if course.is_translucent() && most >= 1 << 30 {
+        return Err(Error::TooLarge(format!(
+            "a cell of {side}x{side} pixels with translucent tiles may have an error of up to {most}, which does not fit the 32 bits of a Vulkan device; use more --tiles, a smaller --size, or --device cpu"
         )));
     }
     Ok(())
@@ -221,8 +249,9 @@ impl FlyRecord {
 /// The words of all pixels, and of all stacks, of a population in its stacks.
 pub(super) fn pixel_words(course: &Course, plan: &Plan, flies: &[Fly], stacks: &Stacks) -> (Vec<u32>, Vec<u32>) {
     let mut pixels = vec![0; plan.pixel_count() * PIXEL_WORDS];
-    let mut words = vec![0; plan.pixel_count() * STACK_WORDS];
+    let mut words = vec![0; plan.stack_words()];
     let Course { rules, target, .. } = course;
+    let is_translucent = course.is_translucent();
     for ((place, stack), number) in plan.places().zip(&stacks.pixels).zip(0..) {
         let color = pack(target.pixels()[number]);
         let weight = target.weights().map_or(1, |weights| u32::from(weights[number]));
@@ -232,7 +261,12 @@ pub(super) fn pixel_words(course: &Course, plan: &Plan, flies: &[Fly], stacks: &
         let layer = |nth: usize| {
             stack.get(nth).map_or((NO_FLY, BACKGROUND_Z, ground), |&(fly, error)| (fly, flies[fly as usize].z, error))
         };
-        let ((top, top_z, top_error), (under, under_z, under_error)) = (layer(0), layer(1));
+        let ((top, top_z, mut top_error), mut behind) = (layer(0), layer(1));
+        if is_translucent {
+            top_error = glazed_error(stack, (color, is_unwanted), rules.background) * weight as i32;
+            behind = (NO_FLY, BACKGROUND_Z, 0);
+        }
+        let (under, under_z, under_error) = behind;
         pixels[place * PIXEL_WORDS..(place + 1) * PIXEL_WORDS].copy_from_slice(&[
             color | (stack.len() as u32) << 24,
             top,
@@ -244,25 +278,36 @@ pub(super) fn pixel_words(course: &Course, plan: &Plan, flies: &[Fly], stacks: &
             ground as u32,
         ]);
         for (entry, &(fly, error)) in stack.iter().enumerate() {
-            let word = stack_word(place, entry);
+            let word = plan.stack_word(place, entry);
             words[word..word + 2].copy_from_slice(&[fly, error as u32]);
         }
     }
     (pixels, words)
 }
 
+/// Error of a pixel of this target under translucent tiles of these looks.
+fn glazed_error(stack: &[(u32, i32)], (target, is_unwanted): (u32, bool), background: u32) -> i32 {
+    let mut pixel = Compositing::START;
+    for look in stack.iter().map(|&(_, look)| look as u32) {
+        pixel.add(opacity_of(look), unpack(look));
+    }
+    match is_unwanted {
+        true if pixel.transmittance < CLEAR => UNWANTED_ERROR,
+        true => 0,
+        false => difference(target, pack(pixel.over(unpack(background)))),
+    }
+}
+
 /// The stacks in these words.
 pub(super) fn stacks(plan: &Plan, pixels: &[u32], words: &[u32]) -> Stacks {
     let stack_at = |place: usize| {
         let depth = (pixels[place * PIXEL_WORDS] >> 24) as usize;
-        (0..depth).map(|entry| stack_word(place, entry)).map(|word| (words[word], words[word + 1] as i32)).collect()
+        (0..depth)
+            .map(|entry| plan.stack_word(place, entry))
+            .map(|word| (words[word], words[word + 1] as i32))
+            .collect()
     };
     Stacks { pixels: plan.places().map(stack_at).collect() }
-}
-
-/// The first word of an entry: in each block first the nearest flies of all pixels, then the next ones.
-fn stack_word(place: usize, entry: usize) -> usize {
-    (place / BLOCK_PIXELS * STACK_DEPTH + entry) * 2 * BLOCK_PIXELS + place % BLOCK_PIXELS * 2
 }
 
 /// Gives the layers of all pixels the depths of their flies.

@@ -24,6 +24,11 @@ pub(super) const CELLS_SCATTER: &[u8] = include_bytes!("../../spirv/cells_scatte
 /// Slices in the order of the flies.
 pub(super) const CELLS_SORT: &[u8] = include_bytes!("../../spirv/cells_sort.comp.spv");
 
+/// Twin: `cpu/cells/cell.rs` with `cpu/cells/translucent.rs`.
+pub(super) const CELLS_GLAZED: &[u8] = include_bytes!("../../spirv/cells_glazed.comp.spv");
+/// Twin: `refresh` in `cpu/cells/translucent.rs`.
+pub(super) const CELLS_FITNESS: &[u8] = include_bytes!("../../spirv/cells_fitness.comp.spv");
+
 /// A module as the words that Vulkan reads; the bytes in the binary may lie at any address.
 pub(super) fn words(module: &[u8]) -> Vec<u32> {
     bytemuck::pod_collect_to_vec(module)

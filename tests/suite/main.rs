@@ -15,6 +15,7 @@ mod cli_scheme;
 mod determinism;
 mod exactness;
 mod files;
+mod glazed_vulkan;
 mod grout;
 mod guides;
 mod layering;

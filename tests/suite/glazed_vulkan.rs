@@ -1,0 +1,214 @@
+//! The cells search among translucent tiles on a Vulkan device comes to the twin's state after every round, `==`.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use smalti::cpu::cells::CpuSearch;
+use smalti::evolve::style::Style;
+use smalti::gpu::{CellForm, CellShape, VulkanSearch};
+use smalti::guide;
+use smalti::model::cells::pixel::TRANSLUCENT_DEPTH;
+use smalti::model::cells::rules::{Acceptance, BirthDepth, BirthKind, ColorSource};
+use smalti::model::cells::{Course, Rules, Search};
+use smalti::model::operators::tile_side;
+use smalti::model::{Fly, Target};
+use smalti::vk::{Device, DeviceOptions};
+
+use crate::canary;
+use crate::scenarios::{stream, translucent_masks};
+
+const BACKGROUND: [u8; 3] = [90, 20, 160];
+
+fn parrots(width_px: u32, height_px: u32) -> Target {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/photos/parrots.png");
+    let photo = image::open(&path).expect("the photo can be read").into_rgb8();
+    let pixel = |place: u32| photo.get_pixel(150 + place % width_px, 100 + place / width_px).0;
+    Target::new(width_px, height_px, (0..width_px * height_px).map(pixel).collect()).expect("the size is right")
+}
+
+/// Two flat colours on a third one: a disc and a bar.
+fn flat(width_px: u32, height_px: u32) -> Target {
+    let pixel = |place: u32| {
+        let (x, y) = (place % width_px, place / width_px);
+        match () {
+            () if (3 * x).abs_diff(width_px).pow(2) + (3 * y).abs_diff(width_px).pow(2) < width_px.pow(2) => {
+                [250, 60, 0]
+            }
+            () if y > height_px * 3 / 4 => [20, 40, 90],
+            () => [240; 3],
+        }
+    };
+    Target::new(width_px, height_px, (0..width_px * height_px).map(pixel).collect()).expect("the size is right")
+}
+
+/// A target where some pixels count more, and others should stay free.
+fn uneven(target: Target) -> Target {
+    let (width, height) = (target.width_px(), target.height_px());
+    let places = || (0..width * height).map(|place| (place % width, place / width));
+    let weights = places().map(|(x, y)| 1 + ((x / 5 + y / 7) % 16) as u8).collect();
+    let transparent = places().map(|(x, y)| x > width / 2 && y > height / 2).collect();
+    target
+        .with_weights(weights)
+        .and_then(|target| target.with_transparent(transparent))
+        .expect("sizes and weights are right")
+}
+
+/// Tiles of the style `spray` in masks of noise, of a soft disc and of the faintest veil, with shades and holes.
+fn course(target: Target, fly_count: usize, change: impl FnOnce(&mut Rules)) -> Course {
+    let side = tile_side(target.width_px(), target.height_px(), fly_count);
+    let masks = translucent_masks(&mut stream(5));
+    let mut rules = Style::spray().rules(7, (side, fly_count), BACKGROUND, BACKGROUND);
+    (rules.mask_first, rules.mask_count) = (0, masks.layers().len() as u32);
+    change(&mut rules);
+    let guide = Arc::new(guide::sharp(&target));
+    Course { rules, target: Arc::new(target), guide, masks: Arc::new(masks), fly_count }
+}
+
+fn narrow(device: &Device) -> CellShape {
+    CellShape { lanes: device.info().subgroup_size, form: CellForm::Narrow, budget: 60_000 }
+}
+
+const WIDE: CellShape = CellShape { lanes: 32, form: CellForm::Wide, budget: 60_000 };
+
+/// Goes through the rounds on both, one by one, and evens out the depths every two.
+fn check_rounds(device: &Arc<Device>, (name, course): (&str, &Course), shape: CellShape, rounds: u32) {
+    let mut twin = CpuSearch::new(course.clone());
+    let mut search = VulkanSearch::with_shape(device, course.clone(), shape).expect("it fits");
+    if course.rules.births.kind == BirthKind::Mutant {
+        let flies = first_flies(course);
+        twin.load(&flies).expect("the twin works");
+        search.load(&flies).expect("the device works");
+        check_equal(&mut twin, &mut search, &format!("{name}, loaded"));
+    }
+    for round in 1..=rounds {
+        twin.advance(1).expect("the twin works");
+        search.advance(1).expect("the device works");
+        check_equal(&mut twin, &mut search, &format!("{name}, {shape:?} after round {round}"));
+        if round % 2 == 0 {
+            twin.renormalise().expect("the twin works");
+            search.renormalise().expect("the device works");
+            check_equal(&mut twin, &mut search, &format!("{name}, {shape:?}, even depths after round {round}"));
+        }
+    }
+    assert!(twin.standing().accepted > 50, "{name}: hardly anything happened");
+}
+
+/// Flies that mutants can come from.
+fn first_flies(course: &Course) -> Vec<Fly> {
+    let mut births = course.rules.births;
+    births.kind = BirthKind::Fresh;
+    let mut search = CpuSearch::new(Course { rules: Rules { births, ..course.rules }, ..course.clone() });
+    search.advance(1).expect("the twin works");
+    search.read_back().expect("the twin works").flies
+}
+
+fn check_equal(twin: &mut CpuSearch, search: &mut VulkanSearch, when: &str) {
+    let (expected, found) = (twin.read_back().expect("the twin works"), search.read_back().expect("the device works"));
+    for (fly, (expected, found)) in expected.flies.iter().zip(&found.flies).enumerate() {
+        assert_eq!(found, expected, "fly {fly}: {when}");
+    }
+    assert_eq!(found.steps, expected.steps, "step sizes: {when}");
+    for (fly, (expected, found)) in expected.fitness.iter().zip(&found.fitness).enumerate() {
+        assert_eq!(found, expected, "marginal fitness of fly {fly}: {when}");
+    }
+    assert_eq!(search.standing(), twin.standing(), "standing: {when}");
+    let (expected, found) =
+        (twin.read_back_stacks().expect("the twin works"), search.read_back_stacks().expect("the device works"));
+    for (pixel, (expected, found)) in expected.pixels.iter().zip(&found.pixels).enumerate() {
+        assert_eq!(found, expected, "pixel {pixel}: {when}");
+    }
+}
+
+#[test]
+fn sprayed_pictures_come_to_the_twins_state_after_every_round_in_narrow_and_wide_workgroups() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        for (candidates, rounds) in [(1, 4), (4, 2)] {
+            let photo = course(parrots(101, 75), 150, |rules| rules.candidates = candidates);
+            let graphic = course(flat(70, 93), 90, |rules| rules.candidates = candidates);
+            for (name, course) in [("a photo", &photo), ("a graphic", &graphic)] {
+                check_rounds(&device, (name, course), narrow(&device), rounds);
+                check_rounds(&device, (name, course), WIDE, 2);
+            }
+        }
+    });
+}
+
+/// Courses for what a style may ask for.
+fn courses() -> Vec<(&'static str, Course)> {
+    let plain = |change: fn(&mut Rules)| course(parrots(80, 66), 110, change);
+    vec![
+        ("weights and transparent pixels", course(uneven(parrots(80, 66)), 110, |rules| rules.candidates = 3)),
+        (
+            "a penalty for turning, and local sizes",
+            plain(|rules| {
+                rules.penalties.turn = 30;
+                rules.bounds.local_size = 1;
+                rules.color = ColorSource::Mean;
+            }),
+        ),
+        (
+            "strict mutants of evolved colours anywhere in depth",
+            plain(|rules| {
+                rules.color = ColorSource::Evolved;
+                rules.births.kind = BirthKind::Mutant;
+                rules.births.depth = BirthDepth::Random;
+                rules.acceptance = Acceptance::Strict;
+                rules.candidates = 3;
+            }),
+        ),
+        ("mutants of fitted colours", plain(|rules| rules.births.kind = BirthKind::Mutant)),
+        ("picked colours", plain(|rules| rules.color = ColorSource::Pick)),
+    ]
+}
+
+#[test]
+fn every_rule_for_translucent_tiles_comes_to_the_twins_state() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        for (name, course) in &courses() {
+            check_rounds(&device, (name, course), narrow(&device), 3);
+        }
+        let (name, course) = &courses()[0];
+        check_rounds(&device, (name, course), WIDE, 2);
+    });
+}
+
+#[test]
+fn stacks_that_are_full_refuse_the_same_children() {
+    let course = course(parrots(64, 48), 400, |rules| {
+        rules.bounds.side_min_q8 = 8 << 8;
+        rules.births.depth = BirthDepth::Random;
+    });
+    let mut twin = CpuSearch::new(course.clone());
+    twin.advance(3).expect("the twin works");
+    let deepest = twin.read_back_stacks().expect("the twin works").pixels.iter().map(Vec::len).max();
+    assert_eq!(deepest, Some(TRANSLUCENT_DEPTH));
+    canary::with_device(&DeviceOptions::default(), |device| {
+        check_rounds(&device, ("full stacks", &course), narrow(&device), 3);
+    });
+}
+
+#[test]
+fn a_small_budget_takes_more_dispatches_of_glazed_cells_and_a_tiny_one_is_an_error() {
+    let course = course(flat(64, 64), 40, |_| {});
+    canary::with_device(&DeviceOptions::default(), |device| {
+        for shape in [narrow(&device), WIDE] {
+            check_rounds(&device, ("a small budget", &course), CellShape { budget: 25_000, ..shape }, 2);
+            let tiny = CellShape { budget: 150, ..shape };
+            let mut search = VulkanSearch::with_shape(&device, course.clone(), tiny).expect("it fits");
+            let error = search.advance(3).expect_err("a step cannot fit").to_string();
+            assert!(error.contains("a step of cell") && error.contains("150 turns"), "{error}");
+        }
+    });
+}
+
+#[test]
+fn translucent_cells_whose_gains_might_not_fit_32_bits_are_refused() {
+    let side = 512;
+    let weights: Vec<u8> = (0..side * side).map(|place| if place == 0 { 1 } else { 16 }).collect();
+    let target = Target::new(side, side, vec![[9; 3]; weights.len()]).and_then(|target| target.with_weights(weights));
+    let course = course(target.expect("sizes and weights are right"), 60, |_| {});
+    canary::with_device(&DeviceOptions::default(), |device| {
+        let told = VulkanSearch::new(&device, course.clone()).err().expect("it is refused").to_string();
+        assert!(told.contains("does not fit the 32 bits"), "{told}");
+    });
+}
