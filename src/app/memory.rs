@@ -1,7 +1,7 @@
 //! Whether the work fits into memory, found out before it begins.
 
 use crate::error::{Error, Result};
-use crate::model::{Backdrop, Canvas, Population, Tile};
+use crate::model::{Backdrop, Blend, Canvas, Population, Tile};
 
 // The first two are about twice what the CPU twin takes for a random population of 50,000 flies at 4096x4096, and of
 // 1,000,000 at 512x512, since lists grow while tiles gather.
@@ -9,6 +9,8 @@ use crate::model::{Backdrop, Canvas, Population, Tile};
 const BYTES_PER_PIXEL: u64 = 40;
 /// Bytes per pixel of a picture that is searched: two layers, errors, and a stack of 16 flies with theirs.
 const BYTES_PER_SEARCHED_PIXEL: u64 = 176;
+/// The same with translucent tiles, of which every pixel keeps more, with what they let through.
+const BYTES_PER_GLAZED_PIXEL: u64 = 301;
 /// Bytes per fly: genes in the current and best population, tile, fitness, and its entries in block lists.
 const BYTES_PER_FLY: u64 = 512;
 /// Bytes per pixel of the written picture: the mosaic, the encoder's copy, and the encoded file.
@@ -51,8 +53,11 @@ pub(super) fn estimate_bytes(pixel_count: u64, fly_count: usize, output_pixel_co
 }
 
 /// About how many bytes a search in cells keeps of so many pixels, besides what an evolution does.
-pub(super) fn search_bytes(pixel_count: u64) -> u64 {
-    pixel_count.saturating_mul(BYTES_PER_SEARCHED_PIXEL)
+pub(super) fn search_bytes(pixel_count: u64, blend: Blend) -> u64 {
+    pixel_count.saturating_mul(match blend {
+        Blend::Opaque => BYTES_PER_SEARCHED_PIXEL,
+        Blend::Translucent => BYTES_PER_GLAZED_PIXEL,
+    })
 }
 
 /// Refuses what needs more memory than there is; passes where that is not known.

@@ -103,8 +103,7 @@ impl fmt::Display for PresetChoice {
 
 /// The names of all styles, for people.
 pub(super) fn style_names() -> String {
-    let names: Vec<&str> = Style::NAMES.into_iter().filter(|name| Style::named(name).is_some()).collect();
-    names.join(", ")
+    Style::NAMES.join(", ")
 }
 
 /// Reads the name of a style; a refusal says which there are.

@@ -123,7 +123,7 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let pixel_count = u64::from(width_px) * u64::from(height_px);
     let search_bytes = match &job.scheme {
-        SchemeOptions::Cells(_) => memory::search_bytes(pixel_count),
+        SchemeOptions::Cells(_) => memory::search_bytes(pixel_count, job.masks().blend()),
         SchemeOptions::Paper(scheme) => scheme::check_fly_count(scheme, job.fly_count).map(|()| 0)?,
     };
     let output = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));

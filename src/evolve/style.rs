@@ -4,6 +4,7 @@
 //! of tiles. All numbers are integers: they decide the picture.
 
 use crate::model::cells::Rules;
+use crate::model::cells::operators::PLACE_TOURNAMENT_MAX;
 use crate::model::cells::rules::{ASPECT_FREE_Q8, Births, Bounds, CLASSES_MAX, Class, Mix, ONE_Q16, Penalties};
 use crate::model::tables::size_factor_q16;
 use crate::model::tile::pack;
@@ -206,6 +207,7 @@ impl Style {
     #[must_use]
     pub fn rules(&self, seed: u64, (side, fly_count): (u32, usize), background: Rgb, grout_color: Rgb) -> Rules {
         let base = Rules::free(seed, side, fly_count, background);
+        debug_assert!(base.births.place_tournament <= PLACE_TOURNAMENT_MAX, "draws of two purposes would coincide");
         let mut classes = base.classes;
         let mut share_q16 = 0;
         for (class, style) in classes.iter_mut().zip(&self.classes) {

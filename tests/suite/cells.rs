@@ -190,6 +190,23 @@ fn flies_that_would_stack_too_deep_become_absent_and_the_others_are_as_they_were
 }
 
 #[test]
+fn a_fly_between_the_pixels_becomes_absent_and_is_born_again() {
+    let course = course(&Style::free(), photograph(64, 64), 12);
+    let between = Fly { x: 30 * 64 + 32, y: 30 * 64 + 32, w: 16, h: 16, alive: true, ..Fly::ABSENT };
+    let seen = Fly { x: 20 * 64, y: 9 * 64, z: 9, w: 4_000, h: 3_000, ..between };
+    let mut flies = vec![between; 12];
+    flies[3] = seen;
+    let mut search = CpuSearch::new(course);
+    search.load(&flies).expect("the twin works");
+    let state = search.read_back().expect("the twin works");
+    assert!((0..).zip(&state.flies).all(|(index, fly)| fly.alive == (index == 3)), "only one covers a pixel");
+    check_state("flies between pixels", &mut search);
+    search.advance(6).expect("the twin works");
+    let alive = search.read_back().expect("the twin works").flies.iter().filter(|fly| fly.alive).count();
+    assert!(alive > 8, "{alive} flies");
+}
+
+#[test]
 fn the_state_does_not_depend_on_the_number_of_threads() {
     for (name, course) in courses() {
         let [one, three] = [1, 3].map(|threads| {

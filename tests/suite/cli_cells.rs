@@ -238,6 +238,22 @@ fn a_palette_holds_all_tiles_to_its_colours() {
 }
 
 #[test]
+fn palettes_of_one_picture_that_recolour_given_flies_differently_have_different_keys() {
+    let workshop = Workshop::new();
+    let black: Vec<u8> = (0..40 * 30).flat_map(|_| [0_u8; 3]).collect();
+    image::RgbImage::from_raw(40, 30, black).unwrap().save(workshop.path("black.png")).unwrap();
+    row(&workshop, &format!("{SMALL} -o flies.npz"));
+    let made = ["000000\nff8000\n", "000000\n0040c0\n"].map(|colors| {
+        workshop.write("own.hex", colors.as_bytes());
+        let line = "evolve black.png --init flies.npz --palette own.hex --evals 0 -o a.npz --save-target t.png --force";
+        let key = row(&workshop, line)["key"].clone();
+        (key, workshop.read("t.png"), archive::read(&workshop.path("a.npz")).unwrap().population)
+    });
+    assert!(made[0].2 != made[1].2, "the flies differ");
+    assert_ne!(made[0].0, made[1].0);
+}
+
+#[test]
 fn a_preset_of_ones_own_is_a_style_with_changes_and_flags_go_before_it() {
     let workshop = Workshop::new();
     workshop.write("plain.toml", b"style = \"mosaic\"\n");

@@ -178,7 +178,13 @@ impl CellsOptions {
             "grout_ring": grout,
             "mask_layers": job.dress.as_ref().map(|dress| &dress.layers_by_run),
         });
-        if let Value::Object(told) = told { told } else { Map::new() }
+        let mut told = if let Value::Object(told) = told { told } else { Map::new() };
+        // Given flies are held to the colours themselves, of which the target need not show all.
+        if let Some(palette) = &job.palette {
+            let colors: Vec<String> = palette.colors().iter().map(|&color| hexadecimal(color)).collect();
+            told.insert("palette".to_owned(), colors.into());
+        }
+        told
     }
 
     /// What differs from the defaults, for people.

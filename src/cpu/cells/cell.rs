@@ -79,11 +79,12 @@ impl<'a, G: Ground> Cell<'a, G> {
         }
     }
 
-    /// Puts a fly where an absent one was, if there is room.
+    /// Puts a fly where an absent one was, if there is room and some pixel for it: without one it would lie in no cell, and
+    /// no step could ever reach it.
     pub fn place(&mut self, place: usize, fly: &Fly) {
         let footprint = Footprint::of(fly, (self.shared.grid.width_px, self.shared.grid.height_px));
         let child = Candidate { victim: place, fly: *fly, footprint, is_birth: true, change: 0 };
-        if self.has_room(&child) {
+        if !footprint.is_empty() && self.has_room(&child) {
             self.replace(&child);
         }
     }
