@@ -222,7 +222,8 @@ fn values_of_a_search_out_of_range_are_refused_with_their_flag() {
         ("--grout-width 65", "--grout-width 65"),
         ("--grout-width NaN", "--grout-width NaN"),
         ("--grout none --grout-width 1", "contradict"),
-        ("--blend translucent --mask disc", "opaque tiles only"),
+        ("--blend translucent --mask disc --grout black", "--grout: translucent tiles have no rings"),
+        ("--style mosaic --shader soft --grout-width 1", "--grout-width: translucent tiles have no rings"),
         ("--palette photo.png --color-mode mean", "--color-mode pick"),
     ] {
         refused(&workshop, &format!("evolve photo.png -o a.png {rest}"), 2, words);
