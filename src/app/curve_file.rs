@@ -1,8 +1,10 @@
 //! The files of `--curve`: where they may go, and what is in them.
 //!
 //! One rule: a file that is there is replaced if it is a curve of the same command, which its key tells (the last column
-//! of the CSV, the last line of the SVG), but a whole curve not by a partial one; any other file only with `--force`.
+//! of the CSV, the last line of the SVG), but not by one that got less far, as a picture
+//! is not; any other file only with `--force`.
 
+use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Read;
@@ -11,6 +13,7 @@ use std::path::{Path, PathBuf};
 use super::destination::{self, Destination};
 use super::interrupt::Interrupt;
 use super::options::Overwrite;
+use super::provenance::{Ending, Story};
 use super::report::Status;
 use super::{cells, curve};
 use crate::archive::KEY_DIGITS;
@@ -65,11 +68,16 @@ impl CurveFile {
     }
 
     /// What this curve is in this form.
-    fn encode(&self, curve: &dyn Tabled, title: &str, (key, status): (&str, Status)) -> Result<Vec<u8>> {
-        let end = self.form.end(key, status);
+    fn encode(&self, curve: &dyn Tabled, title: &str, (key, ending): (&str, &Ending)) -> Result<Vec<u8>> {
+        let status = ending.status;
         match self.form {
             Form::Csv => Ok(curve.csv(word(status), short(key)).into_bytes()),
-            Form::Svg => Ok(format!("{}\n{end}\n", curve.plot(title.to_owned())?.trim_end()).into_bytes()),
+            Form::Svg => {
+                let (lowered, restarts) = ending.lowered();
+                let far = format!("{SVG_FAR}{restarts} {lowered} -->");
+                let end = self.form.end(key, status);
+                Ok(format!("{}\n{far}\n{end}\n", curve.plot(title.to_owned())?.trim_end()).into_bytes())
+            }
         }
     }
 
@@ -79,14 +87,14 @@ impl CurveFile {
         File::open(&self.path).and_then(|file| file.take(BYTES_MAX).read_to_string(&mut text)).ok().map(|_| text)
     }
 
-    /// Whether a curve that ended like `status` must not take the place of what is there: the whole curve of the same
-    /// command, while this one was cut.
-    pub(super) fn should_keep(&self, key: &str, status: Status, overwrite: Overwrite) -> bool {
-        if overwrite == Overwrite::Force || status != Status::Partial || !self.path.is_file() {
+    /// Whether the curve of an evolution that ended like `ending` must not take the place of what is there: that of the same
+    /// command, which got farther.
+    pub(super) fn should_keep(&self, key: &str, ending: &Ending, overwrite: Overwrite) -> bool {
+        if overwrite == Overwrite::Force || !self.path.is_file() {
             return false;
         }
-        let end = self.form.end(key, Status::Complete);
-        self.found().is_some_and(|text| text.lines().next_back().is_some_and(|line| line.ends_with(&end)))
+        let story = self.found().and_then(|text| self.form.story(&text));
+        story.is_some_and(|story| story.is_of(key) && story.is_better_than(ending))
     }
 
     /// Refuses to replace a file that is no curve of the same command.
@@ -139,14 +147,14 @@ pub(super) fn check_writable<'a>(
 }
 
 /// Writes a curve to its files, each in one step, and adds to `written` those that are there now; `told` are the key of its
-/// result and how that ended.
+/// result and how its evolution ended.
 ///
 /// # Errors
 /// The first failure; the files after it are written nevertheless.
 pub(super) fn write(
     files: &[&CurveFile],
     (curve, title): (&dyn Tabled, &str),
-    told: (&str, Status),
+    told: (&str, &Ending),
     interrupt: &mut Interrupt,
     written: &mut Vec<String>,
 ) -> Result<()> {
@@ -169,6 +177,8 @@ pub(super) fn write(
     outcome
 }
 
+/// How the line before the last one of a plot begins: the restarts made, and what they were to lower.
+const SVG_FAR: &str = "<!-- smalti came to ";
 /// How the last line of a plot begins.
 const SVG_END: &str = "<!-- smalti curve ";
 
@@ -180,6 +190,32 @@ impl Form {
             Self::Svg => format!("{SVG_END}{} {} -->", short(key), word(status)),
         }
     }
+
+    /// What a curve of this form tells of its result, and how far that came as far as it is told.
+    fn story(self, text: &str) -> Option<Story> {
+        let last = text.lines().next_back()?;
+        let (key, status, restarts_made, lowered) = match self {
+            Self::Csv => {
+                let names = text.lines().next()?.split(',');
+                let values: HashMap<&str, &str> = names.zip(last.split(',')).collect();
+                let value = |name: &str| values.get(name).copied();
+                let lowered = value("objective").or(value("best_sae"));
+                (value("key")?, value("status")?, value("run"), lowered)
+            }
+            Self::Svg => {
+                let (key, status) = last.strip_prefix(SVG_END)?.strip_suffix(" -->")?.split_once(' ')?;
+                let far = text.lines().rev().nth(1).and_then(|line| line.strip_prefix(SVG_FAR)?.strip_suffix(" -->"));
+                let (restarts, lowered) = far.and_then(|far| far.split_once(' ')).unzip();
+                (key, status, restarts, lowered)
+            }
+        };
+        Some(Story {
+            key: key.to_owned(),
+            is_complete: status != word(Status::Partial),
+            lowered: lowered.and_then(|lowered| lowered.parse().ok()),
+            restarts_made: restarts_made.and_then(|restarts| restarts.parse().ok()),
+        })
+    }
 }
 
 fn word(status: Status) -> &'static str {
@@ -188,4 +224,62 @@ fn word(status: Status) -> &'static str {
 
 fn short(key: &str) -> &str {
     key.get(..KEY_DIGITS).unwrap_or(key)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::provenance::Course;
+    use crate::evolve::{Outcome, StopReason};
+    use crate::model::cells::Standing;
+
+    /// A curve of one point.
+    struct Short(String);
+
+    impl Tabled for Short {
+        fn csv(&self, status: &str, key: &str) -> String {
+            format!("{},{status},{key}\n", self.0)
+        }
+
+        fn plot(&self, _title: String) -> Result<String> {
+            Ok("<svg/>".to_owned())
+        }
+    }
+
+    const KEY: &str = "0123456789abcdef0123456789abcdef";
+
+    #[test]
+    fn of_two_curves_that_were_cut_the_one_that_got_farther_stays() {
+        use Status::{Complete, Partial};
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let searched = |status, objective| {
+            let standing = Standing { objective, ..Standing::default() };
+            Ending { status, ..Ending::new(StopReason::Interrupted, 7, Course::Cells(standing)) }
+        };
+        let evolved = |status, (restarts, sae)| {
+            let course = Course::Paper { outcome: Outcome { restarts, ..Outcome::default() }, births_in_last_run: 0 };
+            Ending { status, ..Ending::new(StopReason::Interrupted, sae, course) }
+        };
+        let of_search = |objective| Short(format!("{}0,0,0,7,{objective},9,,0,0,0,0", cells::CSV_HEADER));
+        let of_run = |run, sae| Short(format!("{}{run},0,0,9,{sae},,0,0,0,0", curve::CSV_HEADER));
+        for (old, new, stays) in [
+            ((of_search(50), searched(Partial, 50)), searched(Partial, 60), true),
+            ((of_search(50), searched(Partial, 50)), searched(Partial, 40), false),
+            ((of_search(50), searched(Partial, 50)), searched(Complete, 60), false),
+            ((of_search(50), searched(Complete, 50)), searched(Partial, 40), true),
+            ((of_run(1, 50), evolved(Partial, (1, 50))), evolved(Partial, (0, 40)), true),
+            ((of_run(1, 50), evolved(Partial, (1, 50))), evolved(Partial, (1, 40)), false),
+            ((of_run(1, 50), evolved(Partial, (1, 50))), evolved(Partial, (1, 60)), true),
+        ] {
+            for name in ["a.csv", "a.svg"] {
+                let file = CurveFile::new(&folder.path().join(name)).expect("its ending is known");
+                let bytes = file.encode(&old.0, "title", (KEY, &old.1)).expect("it can be drawn");
+                std::fs::write(&file.path, bytes).expect("the folder is ours");
+                file.check_replaceable(KEY, Overwrite::Refuse).expect("it is of the same command");
+                assert_eq!(file.should_keep(KEY, &new, Overwrite::Refuse), stays, "{name}: {:?}, {new:?}", old.1);
+                assert!(!file.should_keep(KEY, &new, Overwrite::Force));
+                assert!(!file.should_keep(&"f".repeat(32), &new, Overwrite::Refuse), "another command");
+            }
+        }
+    }
 }

@@ -58,10 +58,13 @@ impl Job {
             Picture::read(&options.input, &reading, &options.colors, options.weight.as_deref())?;
         let dress = dress(options, init.as_ref())?;
         let palette = palette.map(Palette::new).transpose()?;
-        let mut scheme = options.scheme.clone();
-        if let SchemeOptions::Paper(scheme) = &mut scheme {
-            *scheme = fitted_out(scheme.clone(), dress.as_ref(), palette.as_ref());
-        }
+        let worn = dress.as_ref().map(|dress| &dress.masks).or(init.as_ref().map(|population| &population.masks));
+        let is_translucent = worn.is_some_and(|masks| masks.blend() == Blend::Translucent);
+        let scheme = match options.scheme.clone() {
+            SchemeOptions::Paper(scheme) => SchemeOptions::Paper(fitted_out(scheme, dress.as_ref(), palette.as_ref())),
+            SchemeOptions::Cells(cells) if is_translucent => SchemeOptions::Cells(cells.for_translucent_tiles()?),
+            scheme @ SchemeOptions::Cells(_) => scheme,
+        };
         if let (Some(population), Some(path)) = (&init, &options.init) {
             check_fit(population, path, &target)?;
             let pixel_count = u64::from(target.width_px()) * u64::from(target.height_px());
@@ -70,17 +73,17 @@ impl Job {
         }
         let fly_count = init.as_ref().map(|population| population.flies.len()).or(options.fly_count);
         let fly_count = fly_count.unwrap_or_else(|| default_fly_count(target.width_px(), target.height_px()));
-        let grout = match &options.scheme {
+        let grout = match &scheme {
             SchemeOptions::Cells(cells) => cells.grout(&target, fly_count),
             SchemeOptions::Paper(_) => None,
         };
-        let background = match &options.scheme {
+        let background = match &scheme {
             // Where nothing lies behind the tiles, an uncovered pixel counts as black.
             SchemeOptions::Cells(_) if target.transparent().is_some() => [0; 3],
             SchemeOptions::Cells(cells) if asked_for.is_none() => cells.ground(&target, grout),
             _ => background,
         };
-        let job = Self {
+        Ok(Self {
             fly_count,
             target: Arc::new(target),
             original_size_px,
@@ -93,12 +96,7 @@ impl Job {
             grout,
             dress,
             init,
-        };
-        if job.grout.is_some() && job.masks().blend() == Blend::Translucent {
-            let sentence = "--grout: translucent tiles have no rings of grout; drop it, or use opaque masks";
-            return Err(Error::Usage(sentence.to_owned()));
-        }
-        Ok(job)
+        })
     }
 
     /// The tile shapes that the flies may wear.
@@ -156,16 +154,32 @@ impl Job {
         }
     }
 
-    /// The first mask layer that newborn tiles wear, and how many: those that were asked for, or that given flies wear.
+    /// The first mask layer that newborn tiles wear, and how many: those that were asked for, or that given flies wear. A
+    /// search knows only neighbouring layers; if given flies wear others, newborns wear those neighbours that most flies do.
     fn layers_worn(&self, masks: &MaskSet) -> (u32, u32) {
+        let mut wearers = vec![0_usize; masks.layers().len()];
         let named = self.dress.iter().flat_map(|dress| dress.layers_by_run.iter().flatten().copied());
         let given = self.init.iter().flat_map(|population| &population.flies);
         let given = given.filter(|fly| fly.alive && self.dress.is_none()).map(|fly| fly.mask);
-        let layers: Vec<u32> = named.chain(given).map(u32::from).collect();
-        let first = layers.iter().copied().min().unwrap_or(0);
-        let last = layers.iter().copied().max().unwrap_or(0).min(masks.layers().len() as u32 - 1);
-        (first, last - first + 1)
+        for layer in named.chain(given) {
+            wearers[usize::from(layer).min(masks.layers().len() - 1)] += 1;
+        }
+        most_worn(&wearers)
     }
+}
+
+/// The first and the number of those neighbouring layers that have most wearers together, by the wearers of each; the
+/// first such, and the first layer alone if nobody wears any.
+fn most_worn(wearers: &[usize]) -> (u32, u32) {
+    let mut first = 0;
+    let mut runs = Vec::new();
+    for run in wearers.split(|&count| count == 0) {
+        runs.push((run.iter().sum::<usize>(), first, run.len() as u32));
+        first += run.len() as u32 + 1;
+    }
+    let most = runs.iter().map(|run| run.0).max().unwrap_or(0);
+    let found = runs.into_iter().find(|run| run.0 == most && most > 0);
+    found.map_or((0, 1), |(_, first, count)| (first, count))
 }
 
 /// A scheme whose flies wear these masks and are held to this palette.
@@ -371,6 +385,34 @@ pub(super) mod tests {
         assert_eq!((job.target.transparent(), job.target.pixels()[3]), (None, [0, 4, 0]));
         let (_, job) = plan(&path("cut.png"), &["--scheme", "paper", "--background", "ffffff"]);
         assert_eq!((job.target.transparent(), job.target.pixels()[3]), (None, [128, 132, 128]));
+    }
+
+    #[test]
+    fn newborn_tiles_wear_the_neighbouring_layers_that_most_given_flies_wear() {
+        for (wearers, expected) in [
+            (&[5][..], (0, 1)),
+            (&[0, 0], (0, 1)),
+            (&[0, 3, 1, 2], (1, 3)),
+            (&[0, 3, 0, 2], (1, 1)),
+            (&[2, 0, 3], (2, 1)),
+            (&[4, 0, 3, 2, 0], (2, 2)),
+            (&[4, 0, 2, 2], (0, 1)),
+        ] {
+            assert_eq!(most_worn(wearers), expected, "{wearers:?}");
+        }
+    }
+
+    #[test]
+    fn translucent_tiles_drop_what_a_style_says_of_grout_and_gaps_and_no_flag() {
+        let (_folder, path) = folder();
+        let flags = ["--style", "mosaic", "--mask", "disc", "--shader", "soft"];
+        let (_, job) = plan(&path("map.png"), &flags);
+        let SchemeOptions::Cells(cells) = &job.scheme else { panic!("it is a search") };
+        assert_eq!((job.grout, cells.style().overlap, cells.style().hole), (None, 0, 0));
+        assert!(cells.told(&job).contains(&"style mosaic".to_owned()));
+        let rules = job.course(cells).rules;
+        assert_eq!((rules.grout, rules.penalties.overlap, rules.penalties.hole), (0, 0, 0));
+        assert!(rules.penalties.turn > 0);
     }
 
     #[test]

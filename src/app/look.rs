@@ -4,6 +4,7 @@ use std::num::NonZeroU8;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use serde::Deserialize;
 
 use super::presets::{Preset, Shaders};
 use super::values;
@@ -17,43 +18,45 @@ use crate::shapes::{BuiltIn, Outfit, Shader, Template, Wardrobe};
 #[command(next_help_heading = "Tiles")]
 pub(super) struct LookArgs {
     /// Shape of the tiles: square, border, lines, flower, disc, triangle, hexagon, brush, or a PNG or SVG file; several
-    /// with commas or repeated, for a mix [default: square, or as in the population]
+    /// with commas or repeated, for a mix, in which --scheme cells counts each once [default: square, or as the style or
+    /// the population has it]
     #[arg(long = "mask", value_name = "NAME|FILE", value_delimiter = ',')]
     pub masks: Vec<PathBuf>,
     /// What the drawing of a mask becomes: template (its own shading), flat, outline, emboss, soft, hollow, negative, fade
-    /// or wash; for the masks that are named [default: template]
+    /// or wash; for the masks that are named [default: template, or as the style has it]
     #[arg(long, value_name = "NAME")]
     pub shader: Option<Shader>,
     /// Whether a mask's coverage cuts the tile out or is its opacity [default: translucent with --opacity or the shaders
-    /// soft, fade and wash, else opaque]
+    /// soft, fade and wash, or as the style has it, else opaque]
     #[arg(long, value_enum, value_name = "KIND")]
     pub blend: Option<BlendName>,
-    /// Opacity of whole tiles, 0.01 to 1 [default: 1]
+    /// Opacity of whole tiles, 0.01 to 1 [default: 1, or as the style has it]
     #[arg(long, value_name = "A", value_parser = values::number)]
     pub opacity: Option<f64>,
 }
 
 impl LookArgs {
-    /// These flags, or the look of `style` if there are none.
+    /// These flags, each of which goes before what `style` says of the same; with opaque tiles its opacity has no use.
     ///
     /// # Errors
     /// [`Error::Usage`] if there is no such shader as the style names.
     pub(super) fn or_style(&self, style: &Style) -> Result<Self> {
-        let is_told = !self.masks.is_empty() || self.shader.is_some() || self.blend.is_some() || self.opacity.is_some();
-        if is_told || style.masks.is_empty() {
-            return Ok(self.clone());
-        }
-        let is_translucent = style.blend == Blend::Translucent;
+        let masks = style.masks.iter().map(PathBuf::from);
+        // An opaque style leaves it to the shader and the opacity.
+        let blend = self.blend.or((style.blend == Blend::Translucent).then_some(BlendName::Translucent));
+        let opacity = (style.blend == Blend::Translucent && blend == Some(BlendName::Translucent))
+            .then(|| f64::from(style.opacity) / 255.0);
         Ok(Self {
-            masks: style.masks.iter().map(PathBuf::from).collect(),
-            shader: Some(style.shader.parse()?),
-            blend: Some(if is_translucent { BlendName::Translucent } else { BlendName::Opaque }),
-            opacity: is_translucent.then(|| f64::from(style.opacity) / 255.0),
+            masks: if self.masks.is_empty() { masks.collect() } else { self.masks.clone() },
+            shader: Some(self.shader.map_or_else(|| style.shader.parse(), Ok)?),
+            blend,
+            opacity: self.opacity.or(opacity),
         })
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub(super) enum BlendName {
     Opaque,
     Translucent,
@@ -195,5 +198,49 @@ impl Look {
             told += &format!(", translucent, opacity {:.2}", f64::from(self.opacity.get()) / 255.0);
         }
         told
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The look of these flags over the style of this name.
+    fn look(style: &str, flags: LookArgs) -> Look {
+        let style = Style::named(style).expect("there is such a style");
+        let filled = flags.or_style(&style).expect("its shader is known");
+        Look::new(&filled, &[], None).expect("the flags fit together")
+    }
+
+    #[test]
+    fn each_flag_of_the_look_takes_the_place_of_its_own_part_of_the_style() {
+        let flags = LookArgs::default;
+        let (disc, flower) = (vec![PathBuf::from("disc")], vec![PathBuf::from("flower")]);
+        let spray = look("spray", flags());
+        assert_eq!((&spray.masks, spray.shader, spray.blend), (&disc, Shader::Soft, Blend::Translucent));
+        assert_eq!(spray.opacity.get(), 200);
+        let other_mask = look("spray", LookArgs { masks: flower.clone(), ..flags() });
+        assert_eq!(other_mask, Look { masks: flower, ..spray.clone() });
+        let other_opacity = look("spray", LookArgs { opacity: Some(0.2), ..flags() });
+        assert_eq!(other_opacity, Look { opacity: NonZeroU8::new(51).expect("51 is not 0"), ..spray.clone() });
+        let other_shader = look("spray", LookArgs { shader: Some(Shader::Flat), ..flags() });
+        assert_eq!(other_shader, Look { shader: Shader::Flat, ..spray.clone() });
+        let cut_out = look("spray", LookArgs { blend: Some(BlendName::Opaque), ..flags() });
+        assert_eq!(cut_out, Look { blend: Blend::Opaque, opacity: NonZeroU8::MAX, ..spray });
+    }
+
+    #[test]
+    fn an_opaque_style_becomes_translucent_by_any_flag_that_asks_for_it() {
+        let brush = look("paint", LookArgs::default());
+        assert_eq!((brush.blend, &brush.masks), (Blend::Opaque, &vec![PathBuf::from("brush")]));
+        for flags in [
+            LookArgs { opacity: Some(0.5), ..LookArgs::default() },
+            LookArgs { shader: Some(Shader::Soft), ..LookArgs::default() },
+            LookArgs { blend: Some(BlendName::Translucent), ..LookArgs::default() },
+        ] {
+            let look = look("paint", flags);
+            assert_eq!((look.blend, &look.masks), (Blend::Translucent, &brush.masks));
+        }
+        assert!(look("free", LookArgs::default()).is_default() && look("mosaic", LookArgs::default()).is_default());
     }
 }

@@ -66,7 +66,7 @@ impl Ending {
     }
 
     /// What was to be lowered, and the number of restarts before it came so low.
-    fn lowered(&self) -> (i64, u64) {
+    pub(super) fn lowered(&self) -> (i64, u64) {
         match self.course {
             Course::Paper { outcome, .. } => (self.sae as i64, u64::from(outcome.restarts)),
             Course::Cells(standing) => (standing.objective, 0),

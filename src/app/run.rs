@@ -92,7 +92,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     files.extend(result::encode_target(options, &job, &provenances.target)?);
     let written = outputs::write(&files, &mut interrupt, &mut row.output);
     let curve_written = curve.map_or(Ok(()), |curve| {
-        let told = (provenances.population.key(), status);
+        let told = (provenances.population.key(), &ending);
         let files = curves_to_write(options, told);
         curve_file::write(&files, (&*curve, row.id.as_str()), told, &mut interrupt, &mut row.output)
     });
@@ -168,10 +168,10 @@ fn outputs_to_write<'a>(
     outputs
 }
 
-/// The files of the curve without those that hold a whole one, if this one was cut.
-fn curves_to_write<'a>(options: &'a EvolveOptions, (key, status): (&str, Status)) -> Vec<&'a CurveFile> {
+/// The files of the curve without those that hold a better one of the same command.
+fn curves_to_write<'a>(options: &'a EvolveOptions, (key, ending): (&str, &Ending)) -> Vec<&'a CurveFile> {
     let (kept, curves): (Vec<_>, Vec<_>) =
-        options.curves.iter().partition(|file| file.should_keep(key, status, options.overwrite));
+        options.curves.iter().partition(|file| file.should_keep(key, ending, options.overwrite));
     kept.iter().for_each(|file| say_kept(options, &file.path));
     curves
 }

@@ -264,7 +264,7 @@ mod tests {
                 target: Arc::new(target),
                 guide: Arc::new(Guide { columns: 1, rows: 1, samples: vec![sample] }),
                 masks: Arc::new(MaskSet::default()),
-                fly_count: 1,
+                fly_count: 4,
             };
             let standing = Standing { objective: 1_000_000, ..Standing::default() };
             Self { course, standing, evals_per_round, loss, calls: Vec::new() }
@@ -330,9 +330,12 @@ mod tests {
     }
 
     #[test]
-    fn a_search_ends_after_the_epoch_in_which_a_budget_was_spent() {
+    fn a_search_ends_after_the_round_that_spends_its_evals_and_the_epoch_that_reaches_its_target() {
         let evals = |evals| run_until(&mut Scripted::new(10, 2), Budget { evals, ..ENDLESS });
-        assert_eq!([evals(0), evals(1), evals(40), evals(41)].map(|(_, rounds)| rounds), [0, 4, 4, 8]);
+        assert_eq!([evals(0), evals(1), evals(40), evals(41)].map(|(_, rounds)| rounds), [0, 1, 4, 5]);
+        let mut far = Scripted::new(10, 2);
+        assert_eq!(run_until(&mut far, Budget { evals: 75, ..ENDLESS }).1, 8);
+        assert_eq!(far.calls, [4, 0, 1, 1, 1, 1, 0], "rounds are asked for at once until the budget is near");
         assert_eq!(evals(41).0, StopReason::Evals);
         let reached = run_until(&mut Scripted::new(10, 2), Budget { target_sae: Some(100_000), ..ENDLESS });
         assert_eq!(reached, (StopReason::TargetSae, 4));

@@ -202,6 +202,13 @@ impl Style {
         }
     }
 
+    /// The style for translucent tiles: without grout, and without what it costs to overlap or to leave holes, since such
+    /// tiles lie on each other and show what is behind them.
+    #[must_use]
+    pub fn for_translucent_tiles(self) -> Self {
+        Self { overlap: 0, hole: 0, grout_q8: 0, ..self }
+    }
+
     /// The rules of the style for `fly_count` tiles of the mean side `side` (1/64 px) over `background`, with grout of
     /// `grout_color`.
     #[must_use]

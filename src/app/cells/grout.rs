@@ -56,6 +56,14 @@ impl GroutChoice {
         Ok(Self { color, width: width_px.map(in_units) })
     }
 
+    /// The flag that asks for grout, if one does.
+    pub(super) fn asking_flag(&self) -> Option<&'static str> {
+        match self.color {
+            Some(GroutColor::Auto | GroutColor::This(_)) => Some("--grout"),
+            Some(GroutColor::None) | None => self.width.map(|_| "--grout-width"),
+        }
+    }
+
     /// The grout of tiles of the mean side `side` (1/64 px), in a style whose ring has a width of `usual_q8` / 256 over it.
     pub(super) fn of(&self, usual_q8: u32, side: u32, target: &Target) -> Option<Grout> {
         let is_asked_for = self.width.is_some() || self.color.is_some();

@@ -27,14 +27,14 @@ use crate::model::cells::Rules;
 use crate::model::cells::rules::{CANDIDATES_MAX, ColorSource};
 use crate::model::operators::tile_side;
 use crate::model::tile::pack;
-use crate::model::{Grout, Guide, Rgb, Target};
+use crate::model::{Blend, Grout, Guide, Rgb, Target};
 
 /// The flags that only the `cells` scheme has.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Evolution with --scheme cells")]
 pub(super) struct CellsArgs {
-    /// How tiles lie: free (closest likeness), mosaic (whole tiles in rows along the contours) or paint (brush strokes)
-    /// [default: free]
+    /// How tiles lie: free (closest likeness), mosaic (whole tiles in rows along the contours), paint (brush strokes) or
+    /// spray (soft translucent discs) [default: free]
     #[arg(long, value_name = "NAME", value_parser = presets::parse_style, conflicts_with = "preset")]
     pub style: Option<String>,
     /// Stop after so many children were evaluated (suffixes k, M) [default: 400 for each tile]
@@ -103,6 +103,20 @@ impl CellsOptions {
             style: file.map(PresetFile::style).or(named).unwrap_or_else(Style::free),
             grout: GroutChoice::new(args.cells.grout, args.cells.grout_width)?,
         })
+    }
+
+    /// These options for translucent tiles, which what a style says of grout, overlap and holes does not concern.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if grout was asked for.
+    pub(super) fn for_translucent_tiles(mut self) -> Result<Self> {
+        if let Some(flag) = self.grout.asking_flag() {
+            return Err(Error::Usage(format!(
+                "{flag}: translucent tiles have no rings of grout; drop it, or use opaque masks"
+            )));
+        }
+        self.style = self.style.for_translucent_tiles();
+        Ok(self)
     }
 
     /// The style.
@@ -189,7 +203,11 @@ impl CellsOptions {
 
     /// What differs from the defaults, for people.
     pub(super) fn told(&self, job: &Job) -> Vec<String> {
-        let style = Style::NAMES.into_iter().find(|name| Style::named(name).as_ref() == Some(&self.style));
+        let worn = |style: Style| match job.masks().blend() {
+            Blend::Opaque => style,
+            Blend::Translucent => style.for_translucent_tiles(),
+        };
+        let style = Style::NAMES.into_iter().find(|name| Style::named(name).map(worn).as_ref() == Some(&self.style));
         let grout = job.grout.map(|grout| {
             let color = crate::model::target::hexadecimal(grout.color);
             format!("grout of {:.2} px in {color}", f64::from(grout.width) / 64.0)

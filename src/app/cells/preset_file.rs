@@ -10,12 +10,16 @@ use serde::de::{Deserializer, Error as _};
 
 use super::GroutColor;
 use crate::app::cli::EvolveArgs;
+use crate::app::look::BlendName;
+use crate::app::options::in_range;
 use crate::app::presets;
 use crate::app::scheme::ColorModeName;
 use crate::app::values;
 use crate::error::{Error, Result};
 use crate::evolve::style::{ClassStyle, Ground, GuideKind, Style};
-use crate::model::cells::rules::CLASSES_MAX;
+use crate::model::cells::rules::{CANDIDATES_MAX, CLASSES_MAX};
+use crate::model::population::FLY_COUNT_MAX;
+use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::shapes::Shader;
 
 /// Fixed-point one of lengths over d.
@@ -37,7 +41,8 @@ pub(in crate::app) struct PresetFile {
     background: Typed<crate::model::Rgb>,
     masks: Vec<PathBuf>,
     shader: Typed<Shader>,
-    opacity: Option<Share>,
+    blend: Option<BlendName>,
+    opacity: Option<Opacity>,
     grout: Typed<GroutColor>,
     grout_width: Option<Length>,
     side: Option<[Length; 2]>,
@@ -62,7 +67,7 @@ pub(in crate::app) struct PresetFile {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct ClassFile {
     share: Share,
-    scale: Length,
+    scale: Scale,
     #[serde(default)]
     first_round: u16,
 }
@@ -165,6 +170,12 @@ number!(
     ONE_Q8
 );
 number!(
+    /// The d of a class over d, in 1/256.
+    Scale,
+    (0.0, 8.0),
+    ONE_Q8
+);
+number!(
     /// How many times the shorter side the longer one may be, in 1/256; 64 is any.
     Aspect,
     (1.0, 64.0),
@@ -177,9 +188,9 @@ number!(
     65_536.0
 );
 number!(
-    /// What a pixel costs, as an error of three channels would.
+    /// What a pixel costs, as an error of three channels would; the sums over a child must fit 32 bits.
     Cost,
-    (0.0, 10_000.0),
+    (0.0, 1_000.0),
     1.0
 );
 number!(
@@ -188,6 +199,18 @@ number!(
     (0.0, 180.0),
     65_536.0 / 360.0
 );
+
+/// The opacity of whole tiles, 0.01 to 1.
+#[derive(Clone, Copy, Debug)]
+struct Opacity(f64);
+
+impl<'de> Deserialize<'de> for Opacity {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let number = f64::deserialize(deserializer)?;
+        let sentence = || D::Error::custom(format!("{number} is out of range, must be 0.01 to 1"));
+        (0.01..=1.0).contains(&number).then_some(Self(number)).ok_or_else(sentence)
+    }
+}
 
 impl PresetFile {
     /// Reads the file at `path`. Masks that are files lie beside it, unless their paths are absolute.
@@ -205,27 +228,50 @@ impl PresetFile {
             let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
             Error::input(path, format!("{place}{message}"))
         })?;
-        if file.classes.len() > CLASSES_MAX {
-            return Err(Error::input(
-                path,
-                format!("has {} classes, and at most {CLASSES_MAX} are possible", file.classes.len()),
-            ));
-        }
-        let style = file.style();
-        for (word, low, high) in
-            [("side", style.side_min_q8, style.side_max_q8), ("birth-side", style.birth_min_q8, style.birth_max_q8)]
-        {
-            if low > high {
-                let reason =
-                    format!("{word}: the smallest must not be larger than the largest, as in {word} = [0.6, 1.6]");
-                return Err(Error::input(path, reason));
-            }
-        }
+        file.check().map_err(|reason| Error::input(path, reason))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         for mask in file.masks.iter_mut().filter(|mask| mask.extension().is_some()) {
             *mask = folder.join(&mask);
         }
         Ok(file)
+    }
+
+    /// Why the file cannot be followed, though each of its words can be read.
+    fn check(&self) -> Result<(), String> {
+        for (word, value, bounds) in [
+            ("tiles", self.tiles, (1, FLY_COUNT_MAX as u64)),
+            ("size", self.size, (1, u64::from(TARGET_SIDE_MAX_PX))),
+            ("candidates", self.candidates, (1, u64::from(CANDIDATES_MAX))),
+            ("patience", self.patience, (1, u64::MAX)),
+        ] {
+            if let Some(value) = value {
+                in_range(&format!("{word} ="), value, bounds).map_err(|error| error.to_string())?;
+            }
+        }
+        if self.classes.len() > CLASSES_MAX {
+            return Err(format!("has {} classes, and at most {CLASSES_MAX} are possible", self.classes.len()));
+        }
+        if self.has_no_grout() && self.grout_width.is_some() {
+            return Err("grout = \"none\" and grout-width contradict each other; drop one".to_owned());
+        }
+        if self.blend == Some(BlendName::Opaque) && self.opacity.is_some_and(|opacity| opacity.0 < 1.0) {
+            return Err("an opacity below 1 needs blend = \"translucent\", or none".to_owned());
+        }
+        let style = self.style();
+        for (word, low, high) in
+            [("side", style.side_min_q8, style.side_max_q8), ("birth-side", style.birth_min_q8, style.birth_max_q8)]
+        {
+            if low > high {
+                return Err(format!(
+                    "{word}: the smallest must not be larger than the largest, as in {word} = [0.6, 1.6]"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn has_no_grout(&self) -> bool {
+        matches!(self.grout.0, Some(GroutColor::None))
     }
 
     /// `args`, with what the file says where they say nothing.
@@ -247,8 +293,17 @@ impl PresetFile {
             args.look.masks.clone_from(&self.masks);
         }
         args.look.shader = args.look.shader.or(self.shader.0);
-        args.look.opacity = args.look.opacity.or(self.opacity.map(|share| f64::from(share.0) / 65_536.0));
-        args.cells.grout = args.cells.grout.or(self.grout.0);
+        // What a flag contradicts is as good as not told.
+        let (blend, opacity) = (args.look.blend, args.look.opacity);
+        if blend != Some(BlendName::Opaque) {
+            args.look.opacity = opacity.or(self.opacity.map(|opacity| opacity.0));
+        }
+        if opacity.is_none_or(|opacity| opacity >= 1.0) {
+            args.look.blend = blend.or(self.blend);
+        }
+        if args.cells.grout_width.is_none() || !self.has_no_grout() {
+            args.cells.grout = args.cells.grout.or(self.grout.0);
+        }
         args
     }
 
@@ -294,7 +349,7 @@ impl PresetFile {
         if !self.classes.is_empty() {
             let class = |class: &ClassFile| ClassStyle {
                 share_q16: class.share.0,
-                scale_q8: class.scale.0.clamp(1, 8 << 8),
+                scale_q8: class.scale.0.max(1),
                 first_round: u32::from(class.first_round),
             };
             style.classes = self.classes.iter().map(class).collect();
