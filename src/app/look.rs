@@ -206,7 +206,7 @@ mod tests {
     use super::*;
 
     /// The look of these flags over the style of this name.
-    fn look(style: &str, flags: LookArgs) -> Look {
+    fn look(style: &str, flags: &LookArgs) -> Look {
         let style = Style::named(style).expect("there is such a style");
         let filled = flags.or_style(&style).expect("its shader is known");
         Look::new(&filled, &[], None).expect("the flags fit together")
@@ -216,31 +216,31 @@ mod tests {
     fn each_flag_of_the_look_takes_the_place_of_its_own_part_of_the_style() {
         let flags = LookArgs::default;
         let (disc, flower) = (vec![PathBuf::from("disc")], vec![PathBuf::from("flower")]);
-        let spray = look("spray", flags());
+        let spray = look("spray", &flags());
         assert_eq!((&spray.masks, spray.shader, spray.blend), (&disc, Shader::Soft, Blend::Translucent));
         assert_eq!(spray.opacity.get(), 200);
-        let other_mask = look("spray", LookArgs { masks: flower.clone(), ..flags() });
+        let other_mask = look("spray", &LookArgs { masks: flower.clone(), ..flags() });
         assert_eq!(other_mask, Look { masks: flower, ..spray.clone() });
-        let other_opacity = look("spray", LookArgs { opacity: Some(0.2), ..flags() });
+        let other_opacity = look("spray", &LookArgs { opacity: Some(0.2), ..flags() });
         assert_eq!(other_opacity, Look { opacity: NonZeroU8::new(51).expect("51 is not 0"), ..spray.clone() });
-        let other_shader = look("spray", LookArgs { shader: Some(Shader::Flat), ..flags() });
+        let other_shader = look("spray", &LookArgs { shader: Some(Shader::Flat), ..flags() });
         assert_eq!(other_shader, Look { shader: Shader::Flat, ..spray.clone() });
-        let cut_out = look("spray", LookArgs { blend: Some(BlendName::Opaque), ..flags() });
+        let cut_out = look("spray", &LookArgs { blend: Some(BlendName::Opaque), ..flags() });
         assert_eq!(cut_out, Look { blend: Blend::Opaque, opacity: NonZeroU8::MAX, ..spray });
     }
 
     #[test]
     fn an_opaque_style_becomes_translucent_by_any_flag_that_asks_for_it() {
-        let brush = look("paint", LookArgs::default());
+        let brush = look("paint", &LookArgs::default());
         assert_eq!((brush.blend, &brush.masks), (Blend::Opaque, &vec![PathBuf::from("brush")]));
         for flags in [
             LookArgs { opacity: Some(0.5), ..LookArgs::default() },
             LookArgs { shader: Some(Shader::Soft), ..LookArgs::default() },
             LookArgs { blend: Some(BlendName::Translucent), ..LookArgs::default() },
         ] {
-            let look = look("paint", flags);
+            let look = look("paint", &flags);
             assert_eq!((look.blend, &look.masks), (Blend::Translucent, &brush.masks));
         }
-        assert!(look("free", LookArgs::default()).is_default() && look("mosaic", LookArgs::default()).is_default());
+        assert!(look("free", &LookArgs::default()).is_default() && look("mosaic", &LookArgs::default()).is_default());
     }
 }
