@@ -361,7 +361,7 @@ mod tests {
         assert_eq!(watched.calls, [1, 1, 1, 1, 0, 1, 1, 1, 1, 0]);
         alone.load(&[Fly::ABSENT]).expect("nothing fails");
         run_until(&mut alone, Budget { evals: 80, ..ENDLESS });
-        assert_eq!((alone.calls, alone.standing), (vec![4, 0, 4, 0], watched.standing));
+        assert_eq!((alone.calls, alone.standing), (vec![4, 0, 1, 1, 1, 1, 0], watched.standing));
     }
 
     #[test]
