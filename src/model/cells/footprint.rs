@@ -1,4 +1,4 @@
-//! Which pixels a fly covers at evaluation size, as far as the search needs it: a [`Tile`] without colour.
+//! Which pixels a fly covers at evaluation size, as far as the search needs it: a [`crate::model::Tile`] without colour.
 //!
 //! Twin: `glsl/shared/cells_footprint.glsl`. The search bakes millions of children; this does without a division.
 
