@@ -7,14 +7,15 @@ use smalti::cpu::cells::CpuSearch;
 use smalti::evolve::style::Style;
 use smalti::gpu::{CellForm, CellShape, VulkanSearch};
 use smalti::guide;
+use smalti::model::Target;
 use smalti::model::cells::pixel::TRANSLUCENT_DEPTH;
 use smalti::model::cells::rules::{Acceptance, BirthDepth, BirthKind, ColorSource};
 use smalti::model::cells::{Course, Rules, Search};
 use smalti::model::operators::tile_side;
-use smalti::model::{Fly, Target};
 use smalti::vk::{Device, DeviceOptions};
 
 use crate::canary;
+use crate::cells_vulkan::check_named_rounds;
 use crate::scenarios::{stream, translucent_masks};
 
 const BACKGROUND: [u8; 3] = [90, 20, 160];
@@ -70,55 +71,6 @@ fn narrow(device: &Device) -> CellShape {
 
 const WIDE: CellShape = CellShape { lanes: 32, form: CellForm::Wide, budget: 60_000 };
 
-/// Goes through the rounds on both, one by one, and evens out the depths every two.
-fn check_rounds(device: &Arc<Device>, (name, course): (&str, &Course), shape: CellShape, rounds: u32) {
-    let mut twin = CpuSearch::new(course.clone());
-    let mut search = VulkanSearch::with_shape(device, course.clone(), shape).expect("it fits");
-    if course.rules.births.kind == BirthKind::Mutant {
-        let flies = first_flies(course);
-        twin.load(&flies).expect("the twin works");
-        search.load(&flies).expect("the device works");
-        check_equal(&mut twin, &mut search, &format!("{name}, loaded"));
-    }
-    for round in 1..=rounds {
-        twin.advance(1).expect("the twin works");
-        search.advance(1).expect("the device works");
-        check_equal(&mut twin, &mut search, &format!("{name}, {shape:?} after round {round}"));
-        if round % 2 == 0 {
-            twin.renormalise().expect("the twin works");
-            search.renormalise().expect("the device works");
-            check_equal(&mut twin, &mut search, &format!("{name}, {shape:?}, even depths after round {round}"));
-        }
-    }
-    assert!(twin.standing().accepted > 50, "{name}: hardly anything happened");
-}
-
-/// Flies that mutants can come from.
-fn first_flies(course: &Course) -> Vec<Fly> {
-    let mut births = course.rules.births;
-    births.kind = BirthKind::Fresh;
-    let mut search = CpuSearch::new(Course { rules: Rules { births, ..course.rules }, ..course.clone() });
-    search.advance(1).expect("the twin works");
-    search.read_back().expect("the twin works").flies
-}
-
-fn check_equal(twin: &mut CpuSearch, search: &mut VulkanSearch, when: &str) {
-    let (expected, found) = (twin.read_back().expect("the twin works"), search.read_back().expect("the device works"));
-    for (fly, (expected, found)) in expected.flies.iter().zip(&found.flies).enumerate() {
-        assert_eq!(found, expected, "fly {fly}: {when}");
-    }
-    assert_eq!(found.steps, expected.steps, "step sizes: {when}");
-    for (fly, (expected, found)) in expected.fitness.iter().zip(&found.fitness).enumerate() {
-        assert_eq!(found, expected, "marginal fitness of fly {fly}: {when}");
-    }
-    assert_eq!(search.standing(), twin.standing(), "standing: {when}");
-    let (expected, found) =
-        (twin.read_back_stacks().expect("the twin works"), search.read_back_stacks().expect("the device works"));
-    for (pixel, (expected, found)) in expected.pixels.iter().zip(&found.pixels).enumerate() {
-        assert_eq!(found, expected, "pixel {pixel}: {when}");
-    }
-}
-
 #[test]
 fn sprayed_pictures_come_to_the_twins_state_after_every_round_in_narrow_and_wide_workgroups() {
     canary::with_device(&DeviceOptions::default(), |device| {
@@ -126,8 +78,8 @@ fn sprayed_pictures_come_to_the_twins_state_after_every_round_in_narrow_and_wide
             let photo = course(parrots(101, 75), 150, |rules| rules.candidates = candidates);
             let graphic = course(flat(70, 93), 90, |rules| rules.candidates = candidates);
             for (name, course) in [("a photo", &photo), ("a graphic", &graphic)] {
-                check_rounds(&device, (name, course), narrow(&device), rounds);
-                check_rounds(&device, (name, course), WIDE, 2);
+                check_named_rounds(&device, (name, course), narrow(&device), rounds);
+                check_named_rounds(&device, (name, course), WIDE, 2);
             }
         }
     });
@@ -165,10 +117,10 @@ fn courses() -> Vec<(&'static str, Course)> {
 fn every_rule_for_translucent_tiles_comes_to_the_twins_state() {
     canary::with_device(&DeviceOptions::default(), |device| {
         for (name, course) in &courses() {
-            check_rounds(&device, (name, course), narrow(&device), 3);
+            check_named_rounds(&device, (name, course), narrow(&device), 3);
         }
         let (name, course) = &courses()[0];
-        check_rounds(&device, (name, course), WIDE, 2);
+        check_named_rounds(&device, (name, course), WIDE, 2);
     });
 }
 
@@ -183,7 +135,7 @@ fn stacks_that_are_full_refuse_the_same_children() {
     let deepest = twin.read_back_stacks().expect("the twin works").pixels.iter().map(Vec::len).max();
     assert_eq!(deepest, Some(TRANSLUCENT_DEPTH));
     canary::with_device(&DeviceOptions::default(), |device| {
-        check_rounds(&device, ("full stacks", &course), narrow(&device), 3);
+        check_named_rounds(&device, ("full stacks", &course), narrow(&device), 3);
     });
 }
 
@@ -192,7 +144,7 @@ fn a_small_budget_takes_more_dispatches_of_glazed_cells_and_a_tiny_one_is_an_err
     let course = course(flat(64, 64), 40, |_| {});
     canary::with_device(&DeviceOptions::default(), |device| {
         for shape in [narrow(&device), WIDE] {
-            check_rounds(&device, ("a small budget", &course), CellShape { budget: 25_000, ..shape }, 2);
+            check_named_rounds(&device, ("a small budget", &course), CellShape { budget: 25_000, ..shape }, 2);
             let tiny = CellShape { budget: 150, ..shape };
             let mut search = VulkanSearch::with_shape(&device, course.clone(), tiny).expect("it fits");
             let error = search.advance(3).expect_err("a step cannot fit").to_string();
