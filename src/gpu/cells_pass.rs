@@ -54,6 +54,13 @@ impl CellShape {
     /// # Errors
     /// [`Error::TooLarge`] if the steps of this search are too long for any.
     pub fn for_device(info: &DeviceInfo, course: &Course) -> Result<Self> {
+        // All flies may lie in one cell, whose members are ranked eight in a turn of a loop.
+        if info.kind == DeviceKind::Cpu && course.fly_count as u64 > 8 * u64::from(BUDGET) {
+            return Err(Error::TooLarge(format!(
+                "{} tiles are too many for one dispatch of software Vulkan; use fewer --tiles, or --device cpu",
+                course.fly_count
+            )));
+        }
         let narrow = Self { lanes: info.subgroup_size, form: CellForm::Narrow, budget: BUDGET };
         let wide = |lanes| Self { lanes, form: CellForm::Wide, budget: BUDGET };
         let most = LANES_MAX.min(info.limits.workgroup_invocations);

@@ -228,5 +228,7 @@ fn tiles_that_are_too_large_for_32_bits_or_for_a_dispatch_are_refused() {
         assert!(told.contains("does not fit the 32 bits"), "{told}");
         let told = refusal(course(target, 9, |rules| rules.candidates = 64));
         assert!(told.contains("too long for a dispatch"), "{told}");
+        let told = refusal(course(star(64, 64), 480_001, |_| {}));
+        assert!(told.contains("too many for one dispatch"), "{told}");
     });
 }
