@@ -155,7 +155,7 @@ pub(super) fn write(
     files: &[&CurveFile],
     (curve, title): (&dyn Tabled, &str),
     told: (&str, &Ending),
-    interrupt: &mut Interrupt,
+    interrupt: &Interrupt,
     written: &mut Vec<String>,
 ) -> Result<()> {
     let mut outcome = Ok(());

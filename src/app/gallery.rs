@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::interrupt::SharedInterrupt;
+use super::interrupt::Interrupt;
 use super::look::{Dress, Look, LookArgs};
 use super::options::{Overwrite, Verbosity};
 use super::sheet::sheet;
@@ -59,7 +59,7 @@ pub(super) fn make(args: &GalleryArgs) -> ExitCode {
 }
 
 fn try_make(args: &GalleryArgs) -> Result<()> {
-    let interrupt = SharedInterrupt::listen()?;
+    let interrupt = Interrupt::listen()?;
     let page = args.output.join("README.md");
     check_folder(&args.output, &page, args.study.overwrite())?;
     let verbosity = args.study.verbosity();

@@ -1,7 +1,7 @@
 //! Ctrl-C and its relatives: the first asks for an orderly end, a second Ctrl-C ends the process at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use signal_hook::consts::SIGINT;
 use signal_hook::low_level::unregister;
@@ -19,78 +19,52 @@ const SIGNALS: [i32; 3] = [SIGINT, signal_hook::consts::SIGTERM, signal_hook::co
 #[cfg(not(unix))]
 const SIGNALS: [i32; 2] = [SIGINT, signal_hook::consts::SIGTERM];
 
-/// Whether somebody asked for the work to end.
+/// Whether somebody asked for the work to end; all threads look at the same.
 #[derive(Debug, Default)]
 pub(super) struct Interrupt {
     requested: Arc<AtomicBool>,
     /// Whether the next Ctrl-C ends the process.
     armed: Arc<AtomicBool>,
-    /// The actions of the signals that set `armed`.
-    arming: Vec<SigId>,
+    arming: Mutex<Arming>,
+}
+
+/// What sets [`Interrupt::armed`], and who forbids it.
+#[derive(Debug, Default)]
+struct Arming {
+    /// The actions of the signals.
+    actions: Vec<SigId>,
+    /// Threads that are writing.
+    writers: usize,
 }
 
 impl Interrupt {
     /// Listens to the signals from now on.
     pub(super) fn listen() -> Result<Self> {
-        let mut interrupt = Self::default();
+        let interrupt = Self::default();
         interrupt
             .register()
             .map_err(|error| Error::Internal(format!("the handlers of signals cannot be installed ({error})")))?;
         Ok(interrupt)
     }
 
-    fn register(&mut self) -> std::io::Result<()> {
+    fn register(&self) -> std::io::Result<()> {
         // Before the flags: actions run in this order, and the first Ctrl-C must find `armed` still false.
         flag::register_conditional_shutdown(SIGINT, EXIT_AT_ONCE, Arc::clone(&self.armed))?;
         for signal in SIGNALS {
             flag::register(signal, Arc::clone(&self.requested))?;
         }
-        self.register_arming()
+        self.register_arming(&mut self.arming())
     }
 
-    fn register_arming(&mut self) -> std::io::Result<()> {
+    fn register_arming(&self, arming: &mut Arming) -> std::io::Result<()> {
         for signal in SIGNALS {
-            self.arming.push(flag::register(signal, Arc::clone(&self.armed))?);
+            arming.actions.push(flag::register(signal, Arc::clone(&self.armed))?);
         }
         Ok(())
     }
 
-    /// Whether a signal came.
-    pub(super) fn is_requested(&self) -> bool {
-        self.requested.load(Ordering::Relaxed)
-    }
-
-    /// Runs `write`, which no Ctrl-C may cut short: it would leave a temporary file behind.
-    ///
-    /// Only for what ends by itself: a write that waits for a reader could not be ended.
-    pub(super) fn while_writing<T>(&mut self, write: impl FnOnce() -> T) -> T {
-        // First, so that no signal can arm it again.
-        self.arming.drain(..).for_each(|action| {
-            unregister(action);
-        });
-        self.armed.store(false, Ordering::Relaxed);
-        let written = write();
-        // If it cannot be armed, nothing is left to protect, and the end is near.
-        let _ = self.register_arming();
-        if self.is_requested() {
-            self.armed.store(true, Ordering::Relaxed);
-        }
-        written
-    }
-}
-
-/// An interrupt that several threads look at, and write under one after the other.
-#[derive(Debug)]
-pub(super) struct SharedInterrupt {
-    requested: Arc<AtomicBool>,
-    interrupt: Mutex<Interrupt>,
-}
-
-impl SharedInterrupt {
-    /// Listens to the signals from now on.
-    pub(super) fn listen() -> Result<Self> {
-        let interrupt = Interrupt::listen()?;
-        Ok(Self { requested: Arc::clone(&interrupt.requested), interrupt: Mutex::new(interrupt) })
+    fn arming(&self) -> MutexGuard<'_, Arming> {
+        self.arming.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether a signal came; waits for no writer.
@@ -104,9 +78,37 @@ impl SharedInterrupt {
         if self.is_requested() { Err(Error::Interrupted) } else { Ok(()) }
     }
 
-    /// As [`Interrupt::while_writing`].
+    /// Runs `write`, which no Ctrl-C may cut short: it would leave a temporary file behind.
+    ///
+    /// Only for what ends by itself: a write that waits for a reader could not be ended.
     pub(super) fn while_writing<T>(&self, write: impl FnOnce() -> T) -> T {
-        self.interrupt.lock().unwrap_or_else(PoisonError::into_inner).while_writing(write)
+        self.begin_writing();
+        let written = write();
+        self.end_writing();
+        written
+    }
+
+    fn begin_writing(&self) {
+        let mut arming = self.arming();
+        // First, so that no signal can arm it again.
+        arming.actions.drain(..).for_each(|action| {
+            unregister(action);
+        });
+        self.armed.store(false, Ordering::Relaxed);
+        arming.writers += 1;
+    }
+
+    fn end_writing(&self) {
+        let mut arming = self.arming();
+        arming.writers -= 1;
+        if arming.writers > 0 {
+            return;
+        }
+        // If it cannot be armed, nothing is left to protect, and the end is near.
+        let _ = self.register_arming(&mut arming);
+        if self.is_requested() {
+            self.armed.store(true, Ordering::Relaxed);
+        }
     }
 }
 
@@ -118,8 +120,9 @@ mod tests {
 
     #[test]
     fn no_ctrl_c_ends_the_process_while_it_writes_and_the_next_one_after_it_would() {
-        let mut interrupt = Interrupt::listen().expect("signals can be handled");
+        let interrupt = Interrupt::listen().expect("signals can be handled");
         interrupt.while_writing(|| {
+            interrupt.while_writing(|| raise(SIGINT).expect("the signal is sent"));
             for _ in 0..3 {
                 raise(SIGINT).expect("the signal is sent");
             }

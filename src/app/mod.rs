@@ -21,6 +21,7 @@ mod memory;
 mod options;
 mod outputs;
 mod paper;
+mod picture;
 mod presets;
 mod progress;
 mod provenance;

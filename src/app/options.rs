@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use super::cells::{CellsOptions, PresetFile};
-use super::cli::{EvolveArgs, ProgressKind, SchemeName};
+use super::cli::{EvolveArgs, MessageArgs, ProgressKind};
 use super::computing::Computing;
 use super::curve_file::CurveFile;
 use super::destination::{self, Destination};
 use super::look::Look;
+use super::picture::{PictureArgs, SchemeName};
 use super::presets::{Preset, PresetChoice};
 use super::scheme;
 use super::snapshots::SaveRun;
@@ -61,13 +62,24 @@ pub(super) enum SchemeOptions {
 }
 
 impl SchemeOptions {
-    fn new(args: &EvolveArgs, file: Option<&PresetFile>) -> Result<Self> {
+    fn new(args: &PictureArgs, file: Option<&PresetFile>) -> Result<Self> {
         match scheme_name(args) {
             SchemeName::Cells => CellsOptions::new(args, file).map(Self::Cells),
             SchemeName::Paper => {
                 let preset = args.preset.as_ref().and_then(PresetChoice::paper);
                 scheme::paper_scheme(args, preset).map(Self::Paper)
             }
+        }
+    }
+}
+
+impl MessageArgs {
+    /// How much to say.
+    pub(super) fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (false, true) => Verbosity::Verbose,
+            (false, false) => Verbosity::Normal,
         }
     }
 }
@@ -113,6 +125,31 @@ impl EvolveOptions {
     /// # Errors
     /// [`Error::Usage`] that names the flag and what it may be.
     pub(super) fn new(args: &EvolveArgs) -> Result<Self> {
+        let validation = if args.validate { Validation::On } else { Validation::Off };
+        let options = Self {
+            input: args.input.clone(),
+            outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
+            save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
+            curves: args.curves.iter().map(|path| CurveFile::new(path)).collect::<Result<_>>()?,
+            save_run: args.save_run.as_deref().map(|folder| SaveRun::new(folder, args.save_every)).transpose()?,
+            overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
+            mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
+            progress: args.messages.progress.unless(args.messages.quiet),
+            ..Self::of_pictures(&args.picture, args.computing.check(validation)?, args.messages.verbosity())?
+        };
+        if args.json {
+            check_stdout_is_free(&options.outputs)?;
+        }
+        destination::check_size_has_use(&options.outputs, options.output_long_side_px)?;
+        Ok(options)
+    }
+
+    /// What all pictures have in common that are evolved with these flags; the options of one have its input and outputs
+    /// besides.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names the flag and what it may be.
+    pub(super) fn of_pictures(args: &PictureArgs, computing: Computing, verbosity: Verbosity) -> Result<Self> {
         check_scheme_knows(args)?;
         let file = if let Some(PresetChoice::File(path)) = &args.preset { Some(PresetFile::read(path)?) } else { None };
         let filled = file.as_ref().map(|file| file.fill(args.clone()));
@@ -124,18 +161,26 @@ impl EvolveOptions {
             SchemeOptions::Paper(_) => args.look.clone(),
         };
         let look = Look::new(&styled, &args.paper.restart_masks, preset)?;
+        let restarts = if let SchemeOptions::Paper(scheme) = &scheme { scheme.restarts } else { 0 };
+        if look.changes_at_restart() && restarts == 0 {
+            let sentence = if args.paper.restart_masks.is_empty() {
+                "this preset changes its masks at a restart; drop --restarts 0"
+            } else {
+                "--restart-mask needs a restart; add --restarts"
+            };
+            return Err(Error::Usage(sentence.to_owned()));
+        }
         let fly_count = args.tiles.map(|count| in_range("--tiles", count, (1, FLY_COUNT_MAX as u64))).transpose()?;
-        let validation = if args.validate { Validation::On } else { Validation::Off };
         let preset_side = preset.map(|preset| u64::from(preset.side_px));
-        let options = Self {
-            input: args.input.clone(),
-            outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
-            save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
-            curves: args.curves.iter().map(|path| CurveFile::new(path)).collect::<Result<_>>()?,
-            save_run: args.save_run.as_deref().map(|folder| SaveRun::new(folder, args.save_every)).transpose()?,
+        Ok(Self {
+            input: PathBuf::new(),
+            outputs: Vec::new(),
+            save_target: None,
+            curves: Vec::new(),
+            save_run: None,
             output_long_side_px: args.output_size.map(|px| side_px("--output-size", px)).transpose()?,
-            overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
-            mode: if args.dry_run { Mode::DryRun } else { Mode::Work },
+            overwrite: Overwrite::Refuse,
+            mode: Mode::Work,
             fly_count: fly_count.map(|count| count as usize),
             long_side_px: side_px("--size", args.size.unwrap_or(preset_side.unwrap_or(LONG_SIDE_PX)))?,
             colors: colors(args, preset),
@@ -145,24 +190,10 @@ impl EvolveOptions {
             init: args.init.clone(),
             scheme,
             time_limit: args.time,
-            computing: args.computing.check(validation)?,
-            progress: args.progress.unless(args.quiet),
-            verbosity: verbosity(args),
-        };
-        let restarts = if let SchemeOptions::Paper(scheme) = &options.scheme { scheme.restarts } else { 0 };
-        if options.look.changes_at_restart() && restarts == 0 {
-            let sentence = if args.paper.restart_masks.is_empty() {
-                "this preset changes its masks at a restart; drop --restarts 0"
-            } else {
-                "--restart-mask needs a restart; add --restarts"
-            };
-            return Err(Error::Usage(sentence.to_owned()));
-        }
-        if args.json {
-            check_stdout_is_free(&options.outputs)?;
-        }
-        destination::check_size_has_use(&options.outputs, options.output_long_side_px)?;
-        Ok(options)
+            computing,
+            progress: ProgressKind::None,
+            verbosity,
+        })
     }
 
     /// The pictures that decide the target, none of which may be written over.
@@ -189,7 +220,7 @@ pub(super) fn check_stdout_is_free(outputs: &[Destination]) -> Result<()> {
     Ok(())
 }
 
-fn colors(args: &EvolveArgs, preset: Option<Preset>) -> Colors {
+fn colors(args: &PictureArgs, preset: Option<Preset>) -> Colors {
     let of_preset = preset.and_then(|preset| preset.color_count);
     match (&args.palette, args.colors) {
         (Some(path), _) => Colors::Palette(path.clone()),
@@ -200,13 +231,13 @@ fn colors(args: &EvolveArgs, preset: Option<Preset>) -> Colors {
 }
 
 /// The scheme that was asked for, by name or by what needs it.
-pub(super) fn scheme_name(args: &EvolveArgs) -> SchemeName {
+pub(super) fn scheme_name(args: &PictureArgs) -> SchemeName {
     let of_paper = matches!(args.preset, Some(PresetChoice::Paper(_)));
     args.scheme.unwrap_or(if of_paper { SchemeName::Paper } else { SchemeName::Cells })
 }
 
 /// Refuses flags that the scheme has no use for.
-fn check_scheme_knows(args: &EvolveArgs) -> Result<()> {
+fn check_scheme_knows(args: &PictureArgs) -> Result<()> {
     let this = scheme_name(args);
     let of_paper = matches!(args.preset, Some(PresetChoice::Paper(_)));
     let preset = args.preset.as_ref().filter(|_| of_paper != (this == SchemeName::Paper));
@@ -225,14 +256,6 @@ fn check_scheme_knows(args: &EvolveArgs) -> Result<()> {
             "{flag}: only --scheme {other} has it, and this is --scheme {this}; drop one of them"
         )))
     })
-}
-
-fn verbosity(args: &EvolveArgs) -> Verbosity {
-    match (args.quiet, args.verbose) {
-        (true, _) => Verbosity::Quiet,
-        (false, true) => Verbosity::Verbose,
-        (false, false) => Verbosity::Normal,
-    }
 }
 
 /// `value`, if it lies between the bounds, both included.

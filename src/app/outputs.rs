@@ -150,7 +150,7 @@ pub(super) fn encode<'a>(outputs: &[&'a Destination], drawn: Drawn, told: &Told)
 ///
 /// # Errors
 /// The first failure; the files after it are written nevertheless, since hours of work may be in them.
-pub(super) fn write(files: &[EncodedFile<'_>], interrupt: &mut Interrupt, written: &mut Vec<String>) -> Result<()> {
+pub(super) fn write(files: &[EncodedFile<'_>], interrupt: &Interrupt, written: &mut Vec<String>) -> Result<()> {
     let mut outcome = Ok(());
     for EncodedFile { destination, bytes } in files {
         let one = if destination.is_stdout() {

@@ -241,7 +241,7 @@ fn render_population(options: &RenderOptions, row: &mut Row) -> Result<()> {
     let began = Instant::now();
     let files = outputs::encode(&options.outputs.iter().collect::<Vec<_>>(), drawn, &provenances.told(&meta))?;
     // Until here nothing would be left behind.
-    outputs::write(&files, &mut Interrupt::listen()?, &mut row.output)?;
+    outputs::write(&files, &Interrupt::listen()?, &mut row.output)?;
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = Status::Complete;
     if options.verbosity > Verbosity::Quiet {

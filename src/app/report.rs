@@ -8,11 +8,11 @@ use std::time::Duration;
 use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
 
-use super::cli::SchemeName;
 use super::device::Selected;
 use super::interrupt::EXIT_INTERRUPTED;
 use super::job::Job;
 use super::options::{EvolveOptions, SchemeOptions, Verbosity};
+use super::picture::SchemeName;
 use super::provenance::Ending;
 use super::scheme;
 use crate::error::{Error, Result};

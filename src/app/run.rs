@@ -27,7 +27,7 @@ use crate::vk::ValidationLog;
 
 /// Evolves one picture and reports about it; the exit code of the process.
 pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
-    let mut row = Row::new(&args.input, args.seed, scheme_name(args));
+    let mut row = Row::new(&args.input, args.picture.seed, scheme_name(&args.picture));
     let done = EvolveOptions::new(args).and_then(|options| evolve_picture(&options, &mut row));
     if let Err(error) = &done {
         row.note_failure(error);
@@ -45,7 +45,7 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
 
 /// The work, in order: check, read, evolve and draw, encode and write.
 fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
-    let mut interrupt = Interrupt::listen()?;
+    let interrupt = Interrupt::listen()?;
     options.computing.start_threads()?;
     let inputs = options.picture_inputs();
     destination::check_writable(options.destinations(), &inputs)?;
@@ -90,11 +90,11 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let outputs = outputs_to_write(options, &provenances, &ending);
     let mut files = outputs::encode(&outputs, drawn, &provenances.told(&ending))?;
     files.extend(result::encode_target(options, &job, &provenances.target)?);
-    let written = outputs::write(&files, &mut interrupt, &mut row.output);
+    let written = outputs::write(&files, &interrupt, &mut row.output);
     let curve_written = curve.map_or(Ok(()), |curve| {
         let told = (provenances.population.key(), &ending);
         let files = curves_to_write(options, told);
-        curve_file::write(&files, (&*curve, row.id.as_str()), told, &mut interrupt, &mut row.output)
+        curve_file::write(&files, (&*curve, row.id.as_str()), told, &interrupt, &mut row.output)
     });
     written.and(curve_written)?;
     // A broken record of the course is no reason to lose its result.

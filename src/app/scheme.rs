@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use super::cli::EvolveArgs;
 use super::options::in_range;
+use super::picture::PictureArgs;
 use super::presets::Preset;
 use super::{provenance, values};
 use crate::error::{Error, Result};
@@ -123,7 +123,7 @@ impl PaperSchemeArgs {
 ///
 /// # Errors
 /// [`Error::Usage`] that names the flag and what it may be.
-pub(super) fn paper_scheme(args: &EvolveArgs, preset: Option<Preset>) -> Result<PaperScheme> {
+pub(super) fn paper_scheme(args: &PictureArgs, preset: Option<Preset>) -> Result<PaperScheme> {
     let of_preset = preset.map_or(0, |preset| u64::from(preset.restarts()));
     let restarts = in_range("--restarts", args.paper.restarts.unwrap_or(of_preset), (0, RESTARTS_MAX))? as u32;
     let batch_births = in_range("--batch-births", args.paper.batch_births.unwrap_or(1), (1, FLY_COUNT_MAX as u64))?;

@@ -15,7 +15,7 @@ use super::cli::ProgressKind;
 use super::computing::ComputingArgs;
 use super::curve::{Curve, Point};
 use super::device::{Opened, Selected};
-use super::interrupt::SharedInterrupt;
+use super::interrupt::Interrupt;
 use super::options::{Overwrite, Verbosity};
 use super::progress::{Progress, Stage, short_time};
 use super::{report, values};
@@ -135,14 +135,14 @@ impl Recipe {
 /// Where evolutions are made, and how far they are.
 pub(super) struct Study<'a> {
     device: &'a Selected,
-    interrupt: &'a SharedInterrupt,
+    interrupt: &'a Interrupt,
     progress: Mutex<Progress>,
     began: Instant,
     tally: Mutex<Standing>,
 }
 
 impl<'a> Study<'a> {
-    pub(super) fn new(device: &'a Selected, interrupt: &'a SharedInterrupt, progress: Progress) -> Self {
+    pub(super) fn new(device: &'a Selected, interrupt: &'a Interrupt, progress: Progress) -> Self {
         Self {
             device,
             interrupt,

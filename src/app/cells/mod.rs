@@ -13,9 +13,9 @@ pub(super) use self::grout::GroutColor;
 use self::grout::{GroutChoice, grout_color};
 pub(super) use self::preset_file::PresetFile;
 pub(super) use self::work::search_job;
-use super::cli::EvolveArgs;
 use super::job::Job;
 use super::options::in_range;
+use super::picture::PictureArgs;
 use super::presets::{self, PresetChoice};
 use super::scheme::ColorModeName;
 use super::values;
@@ -85,7 +85,7 @@ impl CellsOptions {
     ///
     /// # Errors
     /// [`Error::Usage`] that names the flag and what it may be.
-    pub(super) fn new(args: &EvolveArgs, file: Option<&PresetFile>) -> Result<Self> {
+    pub(super) fn new(args: &PictureArgs, file: Option<&PresetFile>) -> Result<Self> {
         let candidates = args.cells.candidates.unwrap_or(1);
         let patience = args.patience.map(|evals| in_range("--patience", evals, (1, u64::MAX))).transpose()?;
         let name = match &args.preset {
@@ -253,7 +253,7 @@ fn style_told(style: &Style) -> Value {
 }
 
 /// Where colours come from. The target's own pixels are the only ones that surely are of its palette.
-fn color_source(args: &EvolveArgs) -> Result<ColorSource> {
+fn color_source(args: &PictureArgs) -> Result<ColorSource> {
     let source = match args.color_mode {
         None if args.palette.is_some() => ColorSource::Pick,
         None | Some(ColorModeName::Median) => ColorSource::Median,

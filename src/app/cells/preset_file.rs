@@ -9,9 +9,9 @@ use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 
 use super::GroutColor;
-use crate::app::cli::EvolveArgs;
 use crate::app::look::BlendName;
 use crate::app::options::in_range;
+use crate::app::picture::PictureArgs;
 use crate::app::presets;
 use crate::app::scheme::ColorModeName;
 use crate::app::values;
@@ -275,7 +275,7 @@ impl PresetFile {
     }
 
     /// `args`, with what the file says where they say nothing.
-    pub(in crate::app) fn fill(&self, mut args: EvolveArgs) -> EvolveArgs {
+    pub(in crate::app) fn fill(&self, mut args: PictureArgs) -> PictureArgs {
         if args.init.is_none() {
             args.tiles = args.tiles.or(self.tiles);
         }

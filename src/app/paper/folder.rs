@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::page::{GENERATOR, Page};
-use crate::app::interrupt::SharedInterrupt;
+use crate::app::interrupt::Interrupt;
 use crate::app::options::Overwrite;
 use crate::error::{Error, Result};
 use crate::output;
@@ -18,7 +18,7 @@ const HEAD_BYTES: u64 = 512;
 pub(super) struct Folder<'a> {
     root: PathBuf,
     metadata: Metadata,
-    interrupt: &'a SharedInterrupt,
+    interrupt: &'a Interrupt,
 }
 
 impl<'a> Folder<'a> {
@@ -27,7 +27,7 @@ impl<'a> Folder<'a> {
     /// # Errors
     /// [`Error::Usage`] if it is a file, or holds other files and may not be written over; [`Error::Output`] if it cannot
     /// be created.
-    pub(super) fn open(root: &Path, overwrite: Overwrite, interrupt: &'a SharedInterrupt) -> Result<Self> {
+    pub(super) fn open(root: &Path, overwrite: Overwrite, interrupt: &'a Interrupt) -> Result<Self> {
         if root.is_file() {
             return Err(Error::Usage(format!("{} is a file; name a folder", root.display())));
         }

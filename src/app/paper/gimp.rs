@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::app::child::in_its_own_group;
-use crate::app::interrupt::SharedInterrupt;
+use crate::app::interrupt::Interrupt;
 use crate::model::mask::{MASK_SIDE, Mask};
 use crate::photo::{self, Photo, ReadOptions};
 
@@ -37,12 +37,7 @@ pub(super) fn is_installed() -> bool {
 ///
 /// # Errors
 /// A sentence for the page if no picture comes out, be it that somebody asked for the end.
-pub(super) fn paint(
-    picture: &Photo,
-    stroke_count: usize,
-    mask: &Mask,
-    interrupt: &SharedInterrupt,
-) -> Result<Photo, String> {
+pub(super) fn paint(picture: &Photo, stroke_count: usize, mask: &Mask, interrupt: &Interrupt) -> Result<Photo, String> {
     let folder = tempfile::tempdir().map_err(|error| failed(&format!("no temporary folder: {error}")))?;
     let files = Files { folder: folder.path() };
     files.prepare(picture, stroke_count, mask)?;
@@ -85,7 +80,7 @@ impl Files<'_> {
         Ok(())
     }
 
-    fn run(&self, interrupt: &SharedInterrupt) -> Result<(), String> {
+    fn run(&self, interrupt: &Interrupt) -> Result<(), String> {
         let call = r#"(smalti-paint "in.png" "out.png" "smalti")"#;
         let mut command = Command::new(PROGRAM);
         command

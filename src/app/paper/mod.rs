@@ -20,7 +20,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use super::interrupt::SharedInterrupt;
+use super::interrupt::Interrupt;
 use super::study::{Study, StudyArgs};
 use super::{report, values};
 use crate::error::{Error, Result};
@@ -110,7 +110,7 @@ pub(super) fn make(args: &PaperArgs) -> ExitCode {
 }
 
 fn try_make(args: &PaperArgs) -> Result<()> {
-    let interrupt = SharedInterrupt::listen()?;
+    let interrupt = Interrupt::listen()?;
     let verbosity = args.study.verbosity();
     let images = match &args.images {
         None if args.name.needs_pictures() => {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::folder::Folder;
 use super::page::{Cell, FigureTable};
 use super::pictures::Picture;
-use crate::app::interrupt::SharedInterrupt;
+use crate::app::interrupt::Interrupt;
 use crate::app::job::default_fly_count;
 use crate::app::look::{Dress, Look, LookArgs};
 use crate::app::presets::Preset;
@@ -24,7 +24,7 @@ pub(super) struct Workbench<'a> {
     pub study: &'a Study<'a>,
     pub pictures: Vec<Picture>,
     pub folder: Folder<'a>,
-    pub interrupt: &'a SharedInterrupt,
+    pub interrupt: &'a Interrupt,
     /// Births of each run.
     pub births: u64,
     pub seed: u64,

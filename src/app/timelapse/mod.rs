@@ -66,7 +66,7 @@ pub(super) fn make(args: &TimelapseArgs) -> ExitCode {
 
 /// The work, in order: check, open every output, draw and encode, give the files their names.
 fn animate(options: &TimelapseOptions) -> Result<End> {
-    let mut interrupt = Interrupt::listen()?;
+    let interrupt = Interrupt::listen()?;
     options.computing.start_threads()?;
     let snapshots = snapshots::list(&options.folder)?;
     let chosen = frames::choose(&snapshots, options.spacing, options.frame_count);
