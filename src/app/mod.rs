@@ -22,6 +22,7 @@ mod options;
 mod outputs;
 mod paper;
 mod picture;
+mod prepared;
 mod presets;
 mod progress;
 mod provenance;

@@ -19,7 +19,7 @@ use super::options::{self, Overwrite, Verbosity};
 use super::outputs::{self, Drawn, SUPERSAMPLING_MAX, Told, View};
 use super::provenance::{self, Provenance};
 use super::report::{self, Status};
-use super::{memory, run, values};
+use super::{memory, prepared, values};
 use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
 use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
@@ -296,7 +296,7 @@ fn draw(drawn: &mut Drawn, options: &RenderOptions, selected: &Selected) -> Resu
     let Opened { mut evaluator, validation_log } = selected.open(vec![scene])?;
     drawn.draw(&mut *evaluator, &options.outputs, options.verbosity)?;
     drop(evaluator);
-    validation_log.map_or(Ok(()), |log| run::check_messages(&log))
+    validation_log.map_or(Ok(()), |log| prepared::check_messages(&log))
 }
 
 /// The provenance of everything that one command writes.
