@@ -33,6 +33,7 @@ mod result;
 mod run;
 mod scheme;
 mod score;
+mod shard;
 mod sheet;
 mod snapshots;
 mod study;
