@@ -9,6 +9,7 @@ mod cells;
 mod child;
 mod cli;
 mod computing;
+mod config;
 mod curve;
 mod curve_file;
 mod destination;
@@ -18,6 +19,7 @@ mod gallery;
 mod interrupt;
 mod job;
 mod look;
+mod manual;
 mod memory;
 mod options;
 mod outputs;
@@ -59,5 +61,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
         cli::Command::Bench(args) => bench::bench(args),
+        cli::Command::Completions(args) => manual::completions(args),
+        cli::Command::Man(args) => manual::man(args),
     }
 }
