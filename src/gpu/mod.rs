@@ -9,10 +9,13 @@ mod cells_state;
 mod compose_pass;
 mod evaluate_pass;
 mod evaluator;
+mod lane_buffers;
 pub mod layout;
 mod mosaic_pass;
 mod re_render;
 mod shaders;
+mod slots;
+mod submission;
 mod translucent_pass;
 
 pub use cells_pass::{CellForm, CellShape};

@@ -22,6 +22,7 @@ mod layering;
 mod layout;
 mod looks;
 mod paper;
+mod paper_lanes;
 mod reference;
 mod render;
 mod scenarios;
