@@ -7,12 +7,16 @@
 //! by [`side_by_side`]: a birth touches a few blocks, too little work to share among threads, while whole evolutions share
 //! nothing and scale with the cores (`cargo bench --bench lanes`).
 
+mod crew;
+
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, Step, StopReason};
 use crate::model::{Change, Evaluator, Fly};
+
+pub use self::crew::{Ended, Finished, SearchCrew};
 
 /// Watches an evolution and may end it.
 pub trait Observer {
