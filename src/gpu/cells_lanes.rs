@@ -6,8 +6,8 @@ use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
 
 use super::cells_layout::{CellRecord, FlyRecord, SearchHeader};
-use super::cells_pass::{CellsPass, Variant, Worker};
-use super::cells_pools::{LaneSlices, Part, Pool, Pools};
+use super::cells_pass::{CellsPass, Team, Variant};
+use super::cells_pools::{LaneSlices, Part, Pools};
 use super::cells_shape::CellShape;
 use super::cells_state::{self, PIXEL_WORDS, Plan};
 use crate::cpu::cells::CpuSearch;
@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::model::Fly;
 use crate::model::cells::rules::STEP_FIRST;
 use crate::model::cells::{Course, Search, SearchLanes, SearchState, Stacks, Standing, depths};
-use crate::vk::{Device, DeviceKind, PassTime, ReadTicket, Recorder, Timing};
+use crate::vk::{Buffer, Device, DeviceKind, PassTime, ReadTicket, Recorder, Timing};
 
 /// Most iterations of a submission: with the budget of a dispatch well below a watchdog's second. Software Vulkan has no watchdog, but
 /// does the lanes of a dispatch one after the other; there all lanes share them.
@@ -49,10 +49,19 @@ pub struct VulkanLanes {
     device: Arc<Device>,
     recorder: Recorder,
     pass: CellsPass,
-    pools: Pools,
+    kins: Vec<Kin>,
     /// By number; lanes that are free are none.
     lanes: Vec<Option<Lane>>,
-    /// The lanes in the order of their rules on the device; empty if that is out of date.
+    /// Whether the device knows who is there.
+    is_arranged: bool,
+}
+
+/// Lanes that are compiled alike for. They share buffers, of which no other lane has a part: dispatches for different buffers need no
+/// barrier between them.
+struct Kin {
+    variant: Variant,
+    pools: Pools,
+    /// The lanes in the order of their rules on the device.
     order: Vec<usize>,
 }
 
@@ -62,10 +71,14 @@ impl VulkanLanes {
     /// # Errors
     /// If the device fails.
     pub fn create(device: &Arc<Device>, timing: Timing) -> Result<Self> {
-        let mut recorder = Recorder::create(device, "cells search", timing)?;
-        let pools = Pools::create(device, &mut recorder)?;
-        let pass = CellsPass::create(device)?;
-        Ok(Self { device: Arc::clone(device), recorder, pass, pools, lanes: Vec::new(), order: Vec::new() })
+        Ok(Self {
+            device: Arc::clone(device),
+            recorder: Recorder::create(device, "cells search", timing)?,
+            pass: CellsPass::create(device)?,
+            kins: Vec::new(),
+            lanes: Vec::new(),
+            is_arranged: false,
+        })
     }
 
     /// As [`SearchLanes::admit`], with the work of a cell cut otherwise than is best for the device.
@@ -81,13 +94,14 @@ impl VulkanLanes {
         cells_state::check(&course)?;
         shape.check(self.device.info())?;
         let plan = Plan::new(&course);
-        let Some(slices) = self.pools.admit(&mut self.recorder, &course, (&plan, shape))? else { return Ok(None) };
-        let number = slices.first(Pool::Lanes) as usize;
-        if number >= self.lanes.len() {
-            self.lanes.resize_with(number + 1, || None);
+        let variant = Variant::new(&course, shape);
+        let Some(slices) = self.take_slices(&course, variant, (&plan, shape))? else { return Ok(None) };
+        let number = self.lanes.iter().position(Option::is_none).unwrap_or(self.lanes.len());
+        if number == self.lanes.len() {
+            self.lanes.push(None);
         }
         self.lanes[number] = Some(Lane {
-            variant: Variant::new(&course, shape),
+            variant,
             course,
             plan,
             slices,
@@ -100,9 +114,47 @@ impl VulkanLanes {
             failure: None,
             has_old_depths: false,
         });
-        self.order.clear();
         self.begin(number, first)?;
         Ok(Some(number))
+    }
+
+    /// Finds room for a lane among those of its variant.
+    fn take_slices(
+        &mut self,
+        course: &Course,
+        variant: Variant,
+        cut: (&Plan, CellShape),
+    ) -> Result<Option<LaneSlices>> {
+        self.pass.disband();
+        self.is_arranged = false;
+        let place = match self.kins.iter().position(|kin| kin.variant == variant) {
+            Some(place) => place,
+            None => {
+                let pools = Pools::create(&self.device, &mut self.recorder)?;
+                self.kins.push(Kin { variant, pools, order: Vec::new() });
+                self.kins.len() - 1
+            }
+        };
+        let others = self.kins.iter().filter(|kin| kin.variant != variant).map(|kin| kin.pools.bytes());
+        // A lane alone may take what the device has; more of them share half of it.
+        let share = (self.device.info().memory_bytes / 2).saturating_sub(others.sum());
+        let share = self.lanes.iter().any(Option::is_some).then_some(share);
+        let taken = self.kins[place].pools.admit(&mut self.recorder, course, cut, share);
+        if self.kins[place].pools.is_empty() {
+            self.kins.remove(place);
+        }
+        taken
+    }
+
+    fn kin(&self, variant: Variant) -> &Kin {
+        let kin = self.kins.iter().find(|kin| kin.variant == variant);
+        kin.unwrap_or_else(|| panic!("lanes of {variant:?} have no buffers"))
+    }
+
+    /// The buffer of a part, and where a lane's slice begins in it and how long it is, in bytes.
+    fn range(&self, number: usize, part: Part) -> (Arc<Buffer>, u64, u64) {
+        let lane = self.lane(number);
+        self.kin(lane.variant).pools.range(part, &lane.slices)
     }
 
     /// Times of the stages of the last submission, by the stems of their shaders; empty unless created with timestamps.
@@ -168,7 +220,7 @@ impl VulkanLanes {
 
     /// Writes the beginning of a lane's slice.
     fn write(&mut self, number: usize, part: Part, bytes: &[u8]) -> Result<()> {
-        let (buffer, offset, size) = self.pools.range(part, &self.lane(number).slices);
+        let (buffer, offset, size) = self.range(number, part);
         if bytes.len() as u64 > size {
             return Err(Error::Internal(format!("{} bytes for the {size} of {part:?} of a lane", bytes.len())));
         }
@@ -177,7 +229,7 @@ impl VulkanLanes {
 
     /// Asks for a lane's slice.
     fn ask_for(&mut self, number: usize, part: Part) -> Result<ReadTicket> {
-        let (buffer, offset, size) = self.pools.range(part, &self.lane(number).slices);
+        let (buffer, offset, size) = self.range(number, part);
         self.recorder.read_buffer(&buffer, offset, size)
     }
 
@@ -192,18 +244,25 @@ impl VulkanLanes {
         (0..self.lanes.len()).filter(|&number| self.lanes[number].is_some()).collect()
     }
 
-    /// Puts the rules of all lanes on the device, those of a variant side by side.
+    /// Puts the rules of all lanes on the device.
     fn arrange(&mut self) -> Result<()> {
-        let mut order = self.numbers();
-        order.sort_by_key(|&number| (self.lane(number).variant, number));
-        let lanes = || order.iter().map(|&number| self.lane(number));
-        let worker = |lane: &Lane| Worker { variant: lane.variant, plan: lane.plan, fly_count: lane.course.fly_count };
-        let workers: Vec<Worker> = lanes().map(worker).collect();
-        let rules: Vec<_> =
-            lanes().map(|lane| cells_state::rules_record(&lane.course, &lane.plan, &lane.slices)).collect();
-        self.pass.arrange(&workers)?;
-        self.recorder.write_buffer(self.pools.part(Part::Rules), 0, bytemuck::cast_slice(&rules))?;
-        self.order = order;
+        let numbers = self.numbers();
+        let mut teams = Vec::new();
+        for place in 0..self.kins.len() {
+            let variant = self.kins[place].variant;
+            let order: Vec<usize> =
+                numbers.iter().copied().filter(|&number| self.lane(number).variant == variant).collect();
+            let lanes = || order.iter().map(|&number| self.lane(number));
+            let team: Vec<(Plan, usize)> = lanes().map(|lane| (lane.plan, lane.course.fly_count)).collect();
+            let rules: Vec<_> =
+                lanes().map(|lane| cells_state::rules_record(&lane.course, &lane.plan, &lane.slices)).collect();
+            let Kin { pools, order: told, .. } = &mut self.kins[place];
+            self.recorder.write_buffer(pools.part(Part::Rules), 0, bytemuck::cast_slice(&rules))?;
+            *told = order;
+            teams.push(Team { variant, group: pools.bind(self.pass.any_pipeline())?, lanes: team });
+        }
+        self.pass.arrange(&teams)?;
+        self.is_arranged = true;
         Ok(())
     }
 
@@ -223,18 +282,22 @@ impl VulkanLanes {
 
     /// Records what the lanes do in a submission.
     fn record(&mut self, busy: &[usize]) -> Result<()> {
-        if self.order.is_empty() {
+        if !self.is_arranged {
             self.arrange()?;
         }
-        let group = self.pools.bind(self.pass.any_pipeline())?;
-        let with_old_depths: Vec<(u32, Plan)> = (0..)
-            .zip(&self.order)
-            .filter(|&(_, &number)| self.lane(number).has_old_depths)
-            .map(|(place, &number)| (place, self.lane(number).plan))
-            .collect();
-        self.pass.record_depths(&mut self.recorder, &group, &with_old_depths)?;
+        let mut with_old_depths = Vec::new();
+        for place in 0..self.kins.len() {
+            let group = self.kins[place].pools.bind(self.pass.any_pipeline())?;
+            for (first_lane, &number) in (0..).zip(&self.kins[place].order) {
+                let lane = self.lane(number);
+                if lane.has_old_depths {
+                    with_old_depths.push((Arc::clone(&group), first_lane, lane.plan));
+                }
+            }
+        }
+        self.pass.record_depths(&mut self.recorder, &with_old_depths)?;
         let iterations = self.iterations(busy);
-        self.pass.record(&mut self.recorder, &group, iterations)
+        self.pass.record(&mut self.recorder, iterations)
     }
 
     fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
@@ -284,9 +347,13 @@ impl SearchLanes for VulkanLanes {
     }
 
     fn dismiss(&mut self, lane: usize) {
-        if let Some(Lane { slices, course, .. }) = self.lanes[lane].take() {
-            self.pools.dismiss(&slices, &course.masks);
-            self.order.clear();
+        if let Some(Lane { slices, course, variant, .. }) = self.lanes[lane].take() {
+            if let Some(kin) = self.kins.iter_mut().find(|kin| kin.variant == variant) {
+                kin.pools.dismiss(&slices, &course.masks);
+            }
+            self.kins.retain(|kin| !kin.pools.is_empty());
+            self.pass.disband();
+            self.is_arranged = false;
         }
     }
 
@@ -303,13 +370,13 @@ impl SearchLanes for VulkanLanes {
     }
 
     fn ask(&mut self, lane: usize, rounds: u32) -> Result<()> {
-        let Lane { wanted, slices, has_failed, .. } = self.lane_mut(lane);
+        let Lane { wanted, has_failed, .. } = self.lane_mut(lane);
         if *has_failed {
             return Err(Error::Internal(format!("lane {lane} failed before and is asked for more")));
         }
         *wanted += rounds;
-        let (wanted, slices) = (*wanted, *slices);
-        let (buffer, offset, _) = self.pools.range(Part::Header, &slices);
+        let wanted = *wanted;
+        let (buffer, offset, _) = self.range(lane, Part::Header);
         let field = std::mem::offset_of!(SearchHeader, wanted) as u64;
         self.recorder.write_buffer(&buffer, offset + field, bytemuck::bytes_of(&wanted))
     }
@@ -324,15 +391,14 @@ impl SearchLanes for VulkanLanes {
             return Ok(());
         }
         self.record(&busy)?;
-        let bytes = self.pools.lane_capacity() * size_of::<SearchHeader>();
-        let headers = self.recorder.read_buffer(self.pools.part(Part::Header), 0, bytes as u64)?;
+        let tickets = busy.iter().map(|&number| self.ask_for(number, Part::Header)).collect::<Result<Vec<_>>>()?;
         self.recorder.submit_and_wait()?;
-        let headers: Vec<SearchHeader> = self.take(&headers)?;
         for lane in self.lanes.iter_mut().flatten() {
             lane.has_old_depths = false;
         }
-        for number in busy {
-            self.lane_mut(number).absorb(&headers[number]);
+        for (number, ticket) in busy.into_iter().zip(tickets) {
+            let header = self.take::<SearchHeader>(&ticket)?[0];
+            self.lane_mut(number).absorb(&header);
         }
         Ok(())
     }

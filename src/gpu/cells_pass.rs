@@ -2,7 +2,7 @@
 //! tiles marginal fitness. Twin: `cpu/cells/`.
 //!
 //! A dispatch serves all lanes that its shader is compiled alike for: workgroups with the same z work for the same lane, and those
-//! beyond what their lane needs return at once.
+//! beyond what their lane needs return at once. Other lanes have other buffers, so that their dispatches need not wait for each other.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use crate::model::cells::rules::{BirthDepth, BirthKind};
 use crate::vk::{BindingGroup, BindingKind, ComputePass, ComputePipeline, ComputeShader, Device, Recorder};
 
 /// Invocations of a workgroup of the passes that work fly by fly or pixel by pixel.
-const ITEMS_PER_GROUP: u32 = 64;
+const ITEMS_PER_GROUP: u64 = 64;
 
 /// What the steps of cells are compiled for. Lanes that are alike in it share their dispatches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,17 +50,25 @@ impl Variant {
     }
 }
 
-/// A lane that works, as dispatches see it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Worker {
+/// Lanes that are compiled alike for, and their buffers.
+pub(super) struct Team {
     pub variant: Variant,
-    pub plan: Plan,
-    pub fly_count: usize,
+    pub group: Arc<BindingGroup>,
+    /// Plan and number of flies of each, in the order of their rules.
+    pub lanes: Vec<(Plan, usize)>,
 }
 
-/// A shader for some of the lanes that work, side by side in their order.
+impl Team {
+    /// The most that any lane needs of something.
+    fn most(&self, of: impl Fn(&(Plan, usize)) -> u64) -> u32 {
+        self.lanes.iter().map(of).max().unwrap_or(1).max(1) as u32
+    }
+}
+
+/// A shader for some of the lanes that share buffers, side by side in their order.
 struct Dispatch {
     pipeline: Arc<ComputePipeline>,
+    group: Arc<BindingGroup>,
     push: CellsPush,
     lanes: u32,
     /// Most workgroups that one of them needs.
@@ -71,6 +79,23 @@ struct Dispatch {
 struct Stage {
     name: &'static str,
     dispatches: Vec<Dispatch>,
+}
+
+impl Stage {
+    fn new(name: &'static str) -> Self {
+        Self { name, dispatches: Vec::new() }
+    }
+
+    /// Adds a dispatch for all lanes of a team, with the most workgroups that one of them needs.
+    fn add(&mut self, team: &Team, pipeline: &Arc<ComputePipeline>, workgroups: u32) {
+        self.dispatches.push(Dispatch {
+            pipeline: Arc::clone(pipeline),
+            group: Arc::clone(&team.group),
+            push: CellsPush { first_lane: 0, budget: team.variant.shape.budget },
+            lanes: team.lanes.len() as u32,
+            workgroups,
+        });
+    }
 }
 
 /// The pipelines for lanes of one variant.
@@ -113,52 +138,36 @@ impl CellsPass {
         &self.depths
     }
 
-    /// Says which lanes work from now on, in the order of their rules; those of a variant lie side by side.
-    pub fn arrange(&mut self, workers: &[Worker]) -> Result<()> {
-        let of_flies = |workers: &[Worker]| most(workers, |worker| items(worker.fly_count as u64));
-        let of_pixels = |workers: &[Worker]| most(workers, |worker| worker.plan.block_count() as u32);
-        let [deal, scan, scatter, sort] = &self.dealing;
-        let all = |pipeline: &Arc<ComputePipeline>, workgroups| Dispatch {
-            pipeline: Arc::clone(pipeline),
-            push: CellsPush { first_lane: 0, budget: 0 },
-            lanes: workers.len() as u32,
-            workgroups,
-        };
-        let fly_groups = of_flies(workers);
-        let stage = |name, pipeline, workgroups| Stage { name, dispatches: vec![all(pipeline, workgroups)] };
-        let mut stages = vec![
-            stage("cells_deal", deal, fly_groups),
-            stage("cells_scan", scan, 1),
-            stage("cells_scatter", scatter, fly_groups),
-            stage("cells_sort", sort, fly_groups),
-        ];
-        let (mut cells, mut fitness) = (Vec::new(), [Vec::new(), Vec::new()]);
-        let mut first_lane = 0;
-        for alike in workers.chunk_by(|one, next| one.variant == next.variant) {
-            let steps = self.steps_of(alike[0].variant)?;
-            let push = CellsPush { first_lane, budget: alike[0].variant.shape.budget };
-            let lanes = alike.len() as u32;
-            let dispatch = |pipeline: &Arc<ComputePipeline>, workgroups| Dispatch {
-                pipeline: Arc::clone(pipeline),
-                push,
-                lanes,
-                workgroups,
-            };
-            cells.push(dispatch(&steps.cells, most(alike, |worker| worker.plan.cell_count)));
-            if let Some([begin, add]) = &steps.fitness {
-                fitness[0].push(dispatch(begin, of_flies(alike)));
-                fitness[1].push(dispatch(add, of_pixels(alike)));
+    /// Lets go of the buffers of all lanes, until the next ones are told.
+    pub fn disband(&mut self) {
+        self.stages.clear();
+    }
+
+    /// Says which lanes work from now on.
+    pub fn arrange(&mut self, teams: &[Team]) -> Result<()> {
+        const STEMS: [&str; 4] = ["cells_deal", "cells_scan", "cells_scatter", "cells_sort"];
+        let mut stages: Vec<Stage> = STEMS.map(Stage::new).into();
+        let mut steps = [Stage::new("cells"), Stage::new("cells_fitness"), Stage::new("cells_fitness")];
+        for team in teams {
+            let flies = team.most(|(_, fly_count)| (*fly_count as u64).div_ceil(ITEMS_PER_GROUP));
+            let pixels = team.most(|(plan, _)| plan.block_count());
+            for ((stage, pipeline), workgroups) in stages.iter_mut().zip(&self.dealing).zip([flies, 1, flies, flies]) {
+                stage.add(team, pipeline, workgroups);
             }
-            first_lane += lanes;
+            let Steps { cells, fitness, .. } = self.steps_of(team.variant)?;
+            steps[0].add(team, cells, team.most(|(plan, _)| u64::from(plan.cell_count)));
+            if let Some([begin, add]) = fitness {
+                steps[1].add(team, begin, flies);
+                steps[2].add(team, add, pixels);
+            }
         }
-        let is_translucent = |worker: &Worker| worker.variant.is_translucent;
-        let name = match (workers.iter().any(is_translucent), workers.iter().all(is_translucent)) {
-            (false, _) => "cells",
-            (true, true) => "cells_glazed",
-            (true, false) => "cells, cells_glazed",
+        let translucent = teams.iter().filter(|team| team.variant.is_translucent).count();
+        steps[0].name = match translucent {
+            0 => "cells",
+            count if count == teams.len() => "cells_glazed",
+            _ => "cells, cells_glazed",
         };
-        stages.push(Stage { name, dispatches: cells });
-        stages.extend(fitness.map(|dispatches| Stage { name: "cells_fitness", dispatches }));
+        stages.extend(steps);
         stages.retain(|stage| !stage.dispatches.is_empty());
         self.stages = stages;
         Ok(())
@@ -172,42 +181,41 @@ impl CellsPass {
         Ok(&self.steps[place.unwrap_or(self.steps.len() - 1)])
     }
 
-    /// Records the depths of the pixels of lanes, by their places in the order of rules.
-    pub fn record_depths(
-        &self,
-        recorder: &mut Recorder,
-        group: &Arc<BindingGroup>,
-        lanes: &[(u32, Plan)],
-    ) -> Result<()> {
+    /// Records the depths of the pixels of lanes, each told by its buffers, its place in the order of rules and its plan.
+    pub fn record_depths(&self, recorder: &mut Recorder, lanes: &[(Arc<BindingGroup>, u32, Plan)]) -> Result<()> {
         if lanes.is_empty() {
             return Ok(());
         }
         let mut pass = recorder.compute_pass("cells_depths")?;
-        for &(first_lane, plan) in lanes {
-            let push = CellsPush { first_lane, budget: 0 };
-            let workgroups = plan.block_count() as u32;
-            let dispatch = Dispatch { pipeline: Arc::clone(&self.depths), push, lanes: 1, workgroups };
-            self.dispatch(&mut pass, group, &dispatch);
+        for (group, first_lane, plan) in lanes {
+            let dispatch = Dispatch {
+                pipeline: Arc::clone(&self.depths),
+                group: Arc::clone(group),
+                push: CellsPush { first_lane: *first_lane, budget: 0 },
+                lanes: 1,
+                workgroups: plan.block_count() as u32,
+            };
+            self.dispatch(&mut pass, &dispatch);
         }
         Ok(())
     }
 
     /// Records so many iterations: each begins a round in every lane that wants one and has none under way, and takes each cell as far
     /// as the budget allows.
-    pub fn record(&self, recorder: &mut Recorder, group: &Arc<BindingGroup>, iterations: u32) -> Result<()> {
+    pub fn record(&self, recorder: &mut Recorder, iterations: u32) -> Result<()> {
         for _ in 0..iterations {
             for stage in &self.stages {
                 let mut pass = recorder.compute_pass(stage.name)?;
                 for dispatch in &stage.dispatches {
-                    self.dispatch(&mut pass, group, dispatch);
+                    self.dispatch(&mut pass, dispatch);
                 }
             }
         }
         Ok(())
     }
 
-    fn dispatch(&self, pass: &mut ComputePass<'_>, group: &Arc<BindingGroup>, dispatch: &Dispatch) {
-        pass.bind(&dispatch.pipeline, group);
+    fn dispatch(&self, pass: &mut ComputePass<'_>, dispatch: &Dispatch) {
+        pass.bind(&dispatch.pipeline, &dispatch.group);
         pass.push_constants(bytemuck::bytes_of(&dispatch.push));
         let columns = dispatch.workgroups.min(self.device.info().limits.workgroups[0]);
         pass.dispatch(columns, dispatch.workgroups.div_ceil(columns), dispatch.lanes);
@@ -230,14 +238,6 @@ impl Steps {
             fitness: if is_translucent { Some([fitness(0)?, fitness(1)?]) } else { None },
         })
     }
-}
-
-fn items(count: u64) -> u32 {
-    count.div_ceil(u64::from(ITEMS_PER_GROUP)).max(1) as u32
-}
-
-fn most(workers: &[Worker], of: impl Fn(&Worker) -> u32) -> u32 {
-    workers.iter().map(of).max().unwrap_or(1)
 }
 
 fn create_pipeline(

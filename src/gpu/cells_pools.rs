@@ -1,5 +1,5 @@
-//! The buffers that all lanes of a device's cells searches share. Each is a pool of units, such as flies or blocks of pixels, of which
-//! every lane has a slice; a pool grows while lanes are in it.
+//! The buffers that lanes of cells searches share. Each is a pool of units, such as flies or blocks of pixels, of which every lane has a
+//! slice; a pool grows while lanes are in it.
 
 use std::sync::Arc;
 
@@ -130,22 +130,24 @@ impl Pools {
         })
     }
 
-    /// Takes slices for a lane; none if there is no room before others leave.
+    /// Takes slices for a lane; none if there is no room before others leave. `share` are the bytes that these pools may take; a lane
+    /// that is alone on its device has none to heed, and tries.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] or [`Error::OutOfDeviceMemory`] if there is no room for this lane even alone; or if the device fails.
+    /// [`Error::TooLarge`] or [`Error::OutOfDeviceMemory`] if there is no room for a lane alone; or if the device fails.
     pub fn admit(
         &mut self,
         recorder: &mut Recorder,
         course: &Course,
         (plan, shape): (&Plan, CellShape),
+        share: Option<u64>,
     ) -> Result<Option<LaneSlices>> {
         let worn = self.worn.iter().position(|worn| *worn.masks == *course.masks);
         let mut needs = needs(course, plan, shape);
         if worn.is_some() {
             needs[Pool::Masks as usize] = 0;
         }
-        if !self.make_room(recorder, &needs)? {
+        if !self.make_room(recorder, &needs, share)? {
             return Ok(None);
         }
         let mut slices = LaneSlices::default();
@@ -188,7 +190,7 @@ impl Pools {
     }
 
     /// Lets the pools grow until a lane fits; false if they must not.
-    fn make_room(&mut self, recorder: &mut Recorder, needs: &PerPool<u64>) -> Result<bool> {
+    fn make_room(&mut self, recorder: &mut Recorder, needs: &PerPool<u64>, share: Option<u64>) -> Result<bool> {
         let mut exact = self.slices.each_ref().map(Slices::capacity);
         let mut ample = exact;
         for pool in 0..POOLS.len() {
@@ -198,19 +200,17 @@ impl Pools {
                 ample[pool] = exact[pool].max((2 * ample[pool]).min(self.most(pool)));
             }
         }
-        // A lane alone may try what the device has; more of them share half of it.
-        let is_alone = self.lane_count == 0;
-        if is_alone {
-            ample = exact;
-        }
-        let share = self.device.info().memory_bytes / 2;
-        let fits = |units: &PerPool<u64>| {
-            let is_in_range = (0..POOLS.len()).all(|pool| units[pool] <= self.most(pool));
-            is_alone || is_in_range && total_bytes(units) <= share
+        let fits = |units: &PerPool<u64>, share: u64| {
+            total_bytes(units) <= share && (0..POOLS.len()).all(|pool| units[pool] <= self.most(pool))
         };
-        let Some(units) = [ample, exact].into_iter().find(fits) else { return Ok(false) };
+        let units = match share {
+            None => exact,
+            Some(share) if fits(&ample, share) => ample,
+            Some(share) if fits(&exact, share) => exact,
+            Some(_) => return Ok(false),
+        };
         match self.grow(recorder, &units) {
-            Err(Error::OutOfDeviceMemory { .. }) if !is_alone => Ok(false),
+            Err(Error::OutOfDeviceMemory { .. }) if share.is_some() => Ok(false),
             grown => grown.map(|()| true),
         }
     }
@@ -268,9 +268,14 @@ impl Pools {
         (Arc::clone(self.part(part)), slice.first * unit_bytes, slice.count * unit_bytes)
     }
 
-    /// Lanes that have ever been there at once.
-    pub fn lane_capacity(&self) -> usize {
-        self.slices[Pool::Lanes as usize].capacity() as usize
+    /// Bytes of all buffers.
+    pub fn bytes(&self) -> u64 {
+        total_bytes(&self.slices.each_ref().map(Slices::capacity))
+    }
+
+    /// Whether no lane is there.
+    pub fn is_empty(&self) -> bool {
+        self.lane_count == 0
     }
 
     /// The buffers as a pipeline of the search sees them.
