@@ -7,10 +7,9 @@
 //! else of a [`PaperCrew`]. The CPU wants an engine each, by [`side_by_side`]: a birth touches a few blocks, too little work to share among threads, while whole evolutions share
 //! nothing and scale with the cores (`cargo bench --bench lanes`).
 
+mod crew;
 mod paper_crew;
 mod stepping;
-
-pub use paper_crew::{PaperCrew, PaperResult, PaperTask};
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,6 +19,9 @@ use stepping::Stepper;
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, StopReason};
 use crate::model::Evaluator;
+
+pub use self::crew::{Ended, Finished, SearchCrew};
+pub use self::paper_crew::{PaperCrew, PaperResult, PaperTask};
 
 /// Watches an evolution and may end it.
 pub trait Observer {

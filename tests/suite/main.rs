@@ -18,6 +18,7 @@ mod files;
 mod glazed_vulkan;
 mod grout;
 mod guides;
+mod lanes_vulkan;
 mod layering;
 mod layout;
 mod looks;
