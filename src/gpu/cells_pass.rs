@@ -192,22 +192,22 @@ impl CellsPass {
         let push = CellsPush { budget: self.budget };
         let Pipelines { deal, scan, scatter, sort, cells, fitness } = &self.pipelines;
         let mut stages = vec![
-            (deal, self.fly_groups),
-            (scan, 1),
-            (scatter, self.fly_groups),
-            (sort, self.fly_groups),
-            (cells, self.cell_count),
+            ("cells_deal", deal, self.fly_groups),
+            ("cells_scan", scan, 1),
+            ("cells_scatter", scatter, self.fly_groups),
+            ("cells_sort", sort, self.fly_groups),
+            (if fitness.is_some() { "cells_glazed" } else { "cells" }, cells, self.cell_count),
         ];
         if let Some([of_flies, of_pixels]) = fitness {
-            stages.extend([(of_flies, self.fly_groups), (of_pixels, self.block_count)]);
+            let name = "cells_fitness";
+            stages.extend([(name, of_flies, self.fly_groups), (name, of_pixels, self.block_count)]);
         }
-        let mut pass = recorder.compute_pass("cells")?;
         for _ in 0..iterations {
-            for &(pipeline, count) in &stages {
+            for &(name, pipeline, count) in &stages {
+                let mut pass = recorder.compute_pass(name)?;
                 pass.bind(pipeline, &self.group);
                 pass.push_constants(bytemuck::bytes_of(&push));
                 self.dispatch(&mut pass, count);
-                pass.barrier();
             }
         }
         Ok(())
