@@ -9,6 +9,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use super::bench::BenchArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
+use super::inside::InsideArgs;
 use super::paper::PaperArgs;
 use super::picture::PictureArgs;
 use super::render::RenderArgs;
@@ -152,6 +153,8 @@ pub(super) struct EvolveArgs {
     /// Watch every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
+    #[command(flatten)]
+    pub inside: InsideArgs,
 
     #[command(flatten)]
     pub messages: MessageArgs,

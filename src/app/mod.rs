@@ -14,6 +14,7 @@ mod destination;
 mod device;
 mod devices;
 mod gallery;
+mod inside;
 mod interrupt;
 mod job;
 mod look;

@@ -35,6 +35,7 @@ impl Prepared {
     /// As [`Job::load`]; [`Error::TooLarge`] if the work does not fit into memory.
     pub(super) fn load(options: &EvolveOptions, row: &mut Row) -> Result<Self> {
         let began = Instant::now();
+        let _span = options.tracer.span("load").tell("picture", row.id.as_str());
         let job = Job::load(options)?;
         row.load_ms = report::milliseconds(began.elapsed());
         row.tiles = Some(job.fly_count);
@@ -56,6 +57,7 @@ impl Prepared {
         watchers: &mut Watchers<'_>,
         row: &mut Row,
     ) -> Result<Evolved> {
+        let _span = options.tracer.span("evolve").tell("picture", row.id.as_str());
         match &self.job.scheme {
             SchemeOptions::Paper(scheme) => evolve_job(options, &self.job, (scheme, selected), watchers, row),
             SchemeOptions::Cells(cells) => cells::search_job(options, &self.job, (cells, selected), watchers, row),
@@ -101,9 +103,13 @@ fn evolve_job(
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let evolution = Evolution::new(scheme.clone(), 0, width_px, height_px, job.first_flies(scheme));
-    let mut engine = Engine::new(evaluator, vec![evolution]);
+    let mut engine = Engine::new(options.tracer.evaluator(evaluator), vec![evolution]);
     let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress));
-    let ran = engine.run(&mut (&mut watch, &mut curve));
+    let mut course = options.tracer.course();
+    let ran = engine.run(&mut (&mut (&mut watch, &mut curve), &mut course));
+    if let Some(course) = course {
+        course.finish(engine.evolutions());
+    }
     if let Some(curve) = &mut curve {
         curve.finish(engine.evolutions());
     }

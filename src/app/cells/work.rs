@@ -27,7 +27,15 @@ pub(in crate::app) fn search_job(
 ) -> Result<Evolved> {
     let budget = cells.budget(job.fly_count);
     let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress)).of_search(budget.evals);
-    let OpenedSearch { mut search, stand_in, validation_log } = selected.open_search(job.course(cells))?;
+    let course = {
+        let _span = options.tracer.span("guide");
+        job.course(cells)
+    };
+    let OpenedSearch { search, stand_in, validation_log } = {
+        let _span = options.tracer.span("open search");
+        selected.open_search(course)?
+    };
+    let mut search = options.tracer.search(search);
     if let Some(reason) = stand_in {
         row.device = Some("CPU".to_owned());
         if options.verbosity > Verbosity::Quiet {
@@ -36,7 +44,8 @@ pub(in crate::app) fn search_job(
     }
     let mut curve = (!options.curves.is_empty()).then(|| SearchCurve::new(budget.evals));
     let given = job.given_flies(cells.seed);
-    let ran = cells::run(&mut *search, given.as_deref(), &budget, &mut (&mut watch, &mut curve));
+    let observers = &mut (&mut (&mut watch, &mut curve), &mut options.tracer.course());
+    let ran = cells::run(&mut *search, given.as_deref(), &budget, observers);
     let stop = watch.finish_search(&mut *search).and_then(|took| {
         row.evolve_ms = report::milliseconds(took);
         ran
@@ -52,7 +61,8 @@ pub(in crate::app) fn search_job(
     row.spread = Spread::of(&flies, job.target.width_px(), job.target.height_px()).clark_evans;
     validation_log.map_or(Ok(()), |log| check_messages(&log))?;
 
-    let Opened { mut evaluator, validation_log } = selected.open(vec![job.scene()])?;
+    let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
+    let mut evaluator = options.tracer.evaluator(evaluator);
     let (drawn, psnr) = result::draw(&mut *evaluator, options, (job.population(flies), fitness), ending.sae)?;
     row.psnr = psnr;
     drop(evaluator);
