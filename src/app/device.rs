@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::pipelines::{KeptPipelines, PipelineFile};
 use crate::cpu::CpuEvaluator;
 use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
@@ -25,6 +26,8 @@ pub(super) enum Selected {
         validation_log: Arc<ValidationLog>,
         /// Whether somebody asked for Vulkan; else the CPU may stand in for it.
         is_asked_for: bool,
+        /// Keeps what the driver compiled for the next run.
+        _pipelines: KeptPipelines,
     },
 }
 
@@ -98,8 +101,12 @@ fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: 
     };
     let info = devices.iter().find(|info| info.index == index);
     let info = info.ok_or_else(|| Error::Internal(format!("device {index} was chosen and is not listed")))?;
-    let device = Device::create(&instance, info, &DeviceOptions::default())?;
-    Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()), is_asked_for })
+    let pipelines = PipelineFile::read(info);
+    let options = DeviceOptions { pipeline_cache: pipelines.bytes().to_vec(), ..DeviceOptions::default() };
+    let device = Device::create(&instance, info, &options)?;
+    let validation_log = Arc::clone(instance.validation_log());
+    let _pipelines = KeptPipelines::new(pipelines, &device);
+    Ok(Selected::Vulkan { device, validation_log, is_asked_for, _pipelines })
 }
 
 /// The CPU twin in place of a Vulkan that failed and that nobody asked for.
@@ -176,14 +183,16 @@ impl Selected {
         };
         match self {
             Self::Cpu { .. } => Ok(on_cpu(course, None)),
-            Self::Vulkan { device, validation_log, is_asked_for } => match VulkanSearch::new(device, course.clone()) {
-                Ok(search) => {
-                    let validation_log = Some(Arc::clone(validation_log));
-                    Ok(OpenedSearch { search: Box::new(search), stand_in: None, validation_log })
+            Self::Vulkan { device, validation_log, is_asked_for, .. } => {
+                match VulkanSearch::new(device, course.clone()) {
+                    Ok(search) => {
+                        let validation_log = Some(Arc::clone(validation_log));
+                        Ok(OpenedSearch { search: Box::new(search), stand_in: None, validation_log })
+                    }
+                    Err(error) if !is_asked_for => Ok(on_cpu(course, Some(why_no_vulkan(&error)))),
+                    Err(error) => Err(error),
                 }
-                Err(error) if !is_asked_for => Ok(on_cpu(course, Some(why_no_vulkan(&error)))),
-                Err(error) => Err(error),
-            },
+            }
         }
     }
 }

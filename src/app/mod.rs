@@ -23,6 +23,7 @@ mod options;
 mod outputs;
 mod paper;
 mod picture;
+mod pipelines;
 mod prepared;
 mod presets;
 mod progress;

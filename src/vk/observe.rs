@@ -109,6 +109,11 @@ impl Device {
         super::lock(&self.observers).push(observer);
     }
 
+    /// Tells `observer` of no recorder that is created from now on.
+    pub fn stop_observing(&self, observer: &Arc<dyn SubmissionObserver>) {
+        super::lock(&self.observers).retain(|other| !Arc::ptr_eq(other, observer));
+    }
+
     /// How the device's clock can be read best; `None` if it has no timestamps.
     #[must_use]
     pub fn clock_method(&self) -> Option<ClockMethod> {
