@@ -1,21 +1,25 @@
 //! What was typed: commands and flags with their help. What they mean is decided in `options`.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
+use super::batch::BatchArgs;
 use super::bench::BenchArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
 use super::inside::InsideArgs;
+use super::manual::{CompletionsArgs, ManArgs};
 use super::paper::PaperArgs;
 use super::picture::PictureArgs;
 use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
-use super::{report, values};
+use super::{config, report, values};
+use crate::error::{Error, Result};
 
 /// Evolves pictures into mosaics of thousands of tiles.
 #[derive(Debug, Parser)]
@@ -30,6 +34,12 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub(super) command: Command,
+    /// Flags in a TOML file; those that are typed go before it
+    #[arg(long, global = true, value_name = "FILE", env = "SMALTI_CONFIG", help_heading = "Options")]
+    config: Option<PathBuf>,
+    /// What was typed, the name of the program first, and what the file of `--config` added to it.
+    #[arg(skip)]
+    typed: Vec<OsString>,
 }
 
 impl Cli {
@@ -38,7 +48,13 @@ impl Cli {
     /// # Errors
     /// The exit code to end with: 0 after help or version, 2 after a wrong command line.
     pub fn from_command_line() -> Result<Self, ExitCode> {
-        Self::try_parse().map_err(|error| {
+        let mut definition = Self::command();
+        definition.build();
+        let typed = config::expand(std::env::args_os().collect(), &definition).map_err(|error| {
+            report::error(&error.to_string());
+            ExitCode::from(error.exit_code())
+        })?;
+        Self::try_parse_from(&typed).map(|cli| Self { typed, ..cli }).map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
                 report::error(&one_sentence(&error.to_string(), &command_typed()));
             } else {
@@ -47,6 +63,34 @@ impl Cli {
             }
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         })
+    }
+
+    /// The flags that decide a picture, if `flags` were typed, too; each of them goes before what was typed.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if one of them decides no picture, or is wrong.
+    pub(super) fn picture_with(&self, flags: &[String]) -> Result<PictureArgs> {
+        let known = PictureArgs::augment_args(clap::Command::new("picture"));
+        let is_known = |name: &str| known.get_arguments().any(|argument| argument.get_long() == Some(name));
+        for flag in flags {
+            let name = flag.trim_start_matches("--").split('=').next().unwrap_or_default();
+            if !is_known(name) {
+                return Err(Error::Usage(format!(
+                    "params: {name} is no flag that decides a picture; see smalti evolve --help"
+                )));
+            }
+        }
+        let end = self.typed.iter().position(|token| token == "--").unwrap_or(self.typed.len());
+        let (before, after) = self.typed.split_at(end);
+        let tokens = before.iter().cloned().chain(flags.iter().map(OsString::from)).chain(after.iter().cloned());
+        // Given twice, the last one counts.
+        let command = Self::command().mut_subcommand("batch", |batch| batch.args_override_self(true));
+        let wrong = |error: clap::Error| Error::Usage(one_sentence(&error.to_string(), "smalti batch"));
+        let matches = command.try_get_matches_from(tokens).map_err(wrong)?;
+        match Self::from_arg_matches(&matches).map_err(wrong)?.command {
+            Command::Batch(args) => Ok(args.picture),
+            _ => Err(Error::Internal("a batch was typed as another command".to_owned())),
+        }
     }
 }
 
@@ -76,6 +120,10 @@ pub(super) enum Command {
     ///
     /// Thousands of coloured tiles are bred, child by child, until together they look like the picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Evolve many pictures, and go on where it was interrupted
+    ///
+    /// One bad picture never stops the others: the reason is in its line of the results, and the exit code is 3.
+    Batch(Box<BatchArgs>),
     /// Draw a population again, at any size, or write it in another format
     ///
     /// At the size at which it evolved the picture is the one that `evolve` wrote.
@@ -99,6 +147,10 @@ pub(super) enum Command {
     Score(ScoreArgs),
     /// Measure how fast this machine evolves pictures
     Bench(BenchArgs),
+    /// Print what a shell needs to complete commands and flags
+    Completions(CompletionsArgs),
+    /// Print a manual page, or write all of them
+    Man(ManArgs),
 }
 
 const EVOLVE_EXAMPLES: &str = "\
@@ -165,7 +217,7 @@ pub(super) struct EvolveArgs {
 #[command(next_help_heading = "Messages")]
 pub(super) struct MessageArgs {
     /// How to show progress on stderr; a bar needs a terminal, elsewhere it becomes plain lines
-    #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
+    #[arg(long, value_enum, value_name = "KIND", env = "SMALTI_PROGRESS", default_value = "auto")]
     pub progress: ProgressKind,
     /// Say more
     #[arg(short, long, conflicts_with = "quiet")]

@@ -3,11 +3,13 @@
 //! Only this module prints, reads the clock, the environment, or paths given by the user. Failures end as one sentence
 //! on stderr; stdout carries data only.
 
+mod batch;
 mod bench;
 mod cells;
 mod child;
 mod cli;
 mod computing;
+mod config;
 mod curve;
 mod curve_file;
 mod destination;
@@ -18,6 +20,7 @@ mod inside;
 mod interrupt;
 mod job;
 mod look;
+mod manual;
 mod memory;
 mod options;
 mod outputs;
@@ -52,6 +55,7 @@ pub use cli::Cli;
 pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
+        cli::Command::Batch(args) => batch::make(args, cli),
         cli::Command::Render(args) => render::render(args),
         cli::Command::Timelapse(args) => timelapse::make(args),
         cli::Command::Devices(args) => devices::list(args),
@@ -59,5 +63,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
         cli::Command::Bench(args) => bench::bench(args),
+        cli::Command::Completions(args) => manual::completions(args),
+        cli::Command::Man(args) => manual::man(args),
     }
 }
