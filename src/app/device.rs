@@ -29,8 +29,8 @@ pub(super) enum Selected {
         validation_log: Arc<ValidationLog>,
         /// Whether somebody asked for Vulkan; else the CPU may stand in for it.
         is_asked_for: bool,
-        /// Keeps what the driver compiled for the next run.
-        _pipelines: KeptPipelines,
+        /// Keeps what the driver compiled for the next run, when it is dropped.
+        _kept: KeptPipelines,
     },
 }
 
@@ -104,7 +104,21 @@ pub(super) fn select_all(validation: Validation) -> Result<Vec<Selected>> {
             "--devices all: there is no hardware GPU; see smalti devices, or leave it to --device auto".to_owned();
         return Err(Error::NoSuitableDevice { why });
     }
-    gpus.into_iter().map(|info| open(&instance, info, true)).collect()
+    let open = |info: &&DeviceInfo| {
+        let (device, _kept) = open_device(&instance, info)?;
+        let validation_log = Arc::clone(instance.validation_log());
+        Ok(Selected::Vulkan { device, validation_log, is_asked_for: true, _kept })
+    };
+    gpus.iter().map(open).collect()
+}
+
+/// Opens a device, with the pipelines that an earlier run kept.
+fn open_device(instance: &Arc<Instance>, info: &DeviceInfo) -> Result<(Arc<Device>, KeptPipelines)> {
+    let pipelines = PipelineFile::read(info);
+    let options = DeviceOptions { pipeline_cache: pipelines.bytes().to_vec(), ..DeviceOptions::default() };
+    let device = Device::create(instance, info, &options)?;
+    let kept = KeptPipelines::new(pipelines, &device);
+    Ok((device, kept))
 }
 
 fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: bool) -> Result<Selected> {
@@ -120,16 +134,8 @@ fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: 
     };
     let info = devices.iter().find(|info| info.index == index);
     let info = info.ok_or_else(|| Error::Internal(format!("device {index} was chosen and is not listed")))?;
-    open(&instance, info, is_asked_for)
-}
-
-fn open(instance: &Arc<Instance>, info: &DeviceInfo, is_asked_for: bool) -> Result<Selected> {
-    let pipelines = PipelineFile::read(info);
-    let options = DeviceOptions { pipeline_cache: pipelines.bytes().to_vec(), ..DeviceOptions::default() };
-    let device = Device::create(instance, info, &options)?;
-    let validation_log = Arc::clone(instance.validation_log());
-    let _pipelines = KeptPipelines::new(pipelines, &device);
-    Ok(Selected::Vulkan { device, validation_log, is_asked_for, _pipelines })
+    let (device, _kept) = open_device(&instance, info)?;
+    Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()), is_asked_for, _kept })
 }
 
 /// The CPU twin in place of a Vulkan that failed and that nobody asked for.

@@ -77,12 +77,15 @@ fn check_nesting(spans: &[Span<'_>], slack_ns: i64) {
     }
 }
 
-fn check_device_track(trace: &Value, program: &[Span<'_>], device: &[Span<'_>]) {
+/// Every pass lies within the wait of some thread for its submission.
+fn check_device_track(trace: &Value, tracks: &BTreeMap<(u64, u64), Vec<Span<'_>>>) {
+    let device = &tracks[&(2, 1)];
     let clock = &trace["smalti"]["clocks"]["2"];
     assert_eq!(clock["method"], "calibrated timestamps");
     let slack_ns = nanoseconds(&clock["largest_deviation_us"]) + 2;
     check_nesting(device, 2);
-    let waits = program.iter().filter(|span| span.name == "submit and wait");
+    let program = tracks.iter().filter(|((process, _), _)| *process == 1);
+    let waits = program.flat_map(|(_, spans)| spans).filter(|span| span.name == "submit and wait");
     let waits: BTreeMap<u64, &Span<'_>> = waits.map(|span| (span.submission.unwrap(), span)).collect();
     assert!(waits.keys().copied().eq(1..=waits.len() as u64), "submissions are counted from 1");
     for pass in device {
@@ -132,10 +135,44 @@ fn a_trace_has_the_work_of_threads_and_device_on_one_clock_and_changes_no_byte()
                 assert_eq!(device, "cpu");
                 continue;
             };
-            check_device_track(&trace, program, device_track);
+            check_device_track(&trace, &tracks);
             for name in passes {
                 assert!(device_track.iter().any(|span| span.name == *name), "no pass {name}");
             }
+        }
+    }
+}
+
+#[test]
+fn the_trace_of_a_batch_has_all_threads_and_pictures() {
+    for device in ["cpu", "vulkan"] {
+        let workshop = Workshop::new();
+        let names = ["a", "b", "c", "d"];
+        for name in names {
+            workshop.paint(&format!("{name}.png"), 30, 20);
+        }
+        let line =
+            "batch a.png b.png c.png d.png -o out -n 20 --evals 800 --in-flight 2 --io-threads 2:2 --trace trace.json";
+        let ran = workshop.run(&format!("{line} --device {device}"));
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        let trace: Value = serde_json::from_slice(&workshop.read("trace.json")).expect("the trace is JSON");
+        let tracks = spans(&trace);
+        let of_program: Vec<_> = tracks.iter().filter(|((process, _), _)| *process == 1).collect();
+        assert!(of_program.len() >= 3, "threads read, evolve and save");
+        of_program.iter().for_each(|(_, spans)| check_nesting(spans, 0));
+        let events = trace["traceEvents"].as_array().unwrap();
+        for stage in ["load", "evolve", "save"] {
+            let mut told: Vec<&str> = events
+                .iter()
+                .filter(|event| event["name"] == stage)
+                .map(|event| event["args"]["picture"].as_str().expect("it tells its picture"))
+                .collect();
+            told.sort_unstable();
+            assert_eq!(told, names, "{stage}");
+        }
+        assert_eq!(tracks.contains_key(&(2, 1)), device == "vulkan");
+        if device == "vulkan" {
+            check_device_track(&trace, &tracks);
         }
     }
 }

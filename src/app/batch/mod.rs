@@ -32,14 +32,13 @@ use self::summary::Summary;
 use self::threads::IoThreads;
 use super::cli::{Cli, MessageArgs};
 use super::computing::{ComputingArgs, DevicesArg};
-use super::inside::{self, Tracer};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::options::{EvolveOptions, Overwrite, Verbosity};
 use super::picture::PictureArgs;
 use super::progress::Progress;
 use super::report::{self, Row, Status};
 use super::shard::{self, ShardChoice};
-use super::{memory, values};
+use super::{inside, memory, values};
 use crate::error::{Error, Result};
 use crate::output::{self, Journal};
 use crate::vk::Validation;
@@ -93,9 +92,6 @@ pub(super) struct BatchArgs {
     /// shard]
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub results: Option<PathBuf>,
-    /// Also write what threads and devices did when, as JSON for ui.perfetto.dev or chrome://tracing; changes no result
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub trace: Option<PathBuf>,
     /// Only list what would be done; write nothing
     #[arg(long, help_heading = "Output")]
     pub dry_run: bool,
@@ -119,6 +115,10 @@ pub(super) struct BatchArgs {
     /// Watch every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
+
+    /// Also write what threads and devices did when, as JSON for ui.perfetto.dev or chrome://tracing; changes no result
+    #[arg(long, value_name = "FILE", help_heading = "Seeing inside")]
+    pub trace: Option<PathBuf>,
 
     #[command(flatten)]
     pub messages: MessageArgs,
@@ -165,15 +165,15 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
     if verbosity > Verbosity::Quiet && shard.is_some() {
         report::say(&format!("smalti: {} of {all} pictures are in this shard", items.len()));
     }
-    let tracer = match &args.trace {
-        Some(path) => inside::begin_trace(path, &[], Overwrite::Refuse)?,
-        None => Tracer::default(),
-    };
     computing.start_threads()?;
+    let taken: Vec<&Path> = items.iter().map(|item| item.input.as_path()).chain([results.as_path()]).collect();
+    let begin = |path: &PathBuf| inside::begin_trace(path, &taken, Overwrite::Refuse);
+    let tracer = args.trace.as_ref().map(begin).transpose()?.unwrap_or_default();
     let workers = threads::workers(args, &computing, items.len())?;
     if verbosity > Verbosity::Quiet {
         workers.iter().for_each(|worker| report::say_device(&worker.selected));
     }
+    workers.iter().for_each(|worker| inside::trace_device(&tracer, &worker.selected));
     let pipeline = Pipeline {
         items: &items,
         workers: &workers,
@@ -185,16 +185,14 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
         interrupt: &interrupt,
         tracer: &tracer,
     };
-    workers.iter().for_each(|worker| inside::trace_device(&tracer, &worker.selected));
     let (summary, fatal) = watch(&pipeline, &mut journal, args);
-    if tracer.is_on() {
-        interrupt.while_writing(|| tracer.finish())?;
-    }
+    let traced = interrupt.while_writing(|| tracer.finish());
     if verbosity > Verbosity::Quiet {
         summary.print(&results);
     }
     match fatal {
         Some(error) => Err(error),
+        None if traced.is_err() => traced.map(|_| 0),
         None if interrupt.is_requested() => Ok(EXIT_INTERRUPTED),
         None if summary.failed() > 0 => Ok(EXIT_SOME_FAILED),
         None => Ok(0),
