@@ -1,11 +1,15 @@
 //! Cells searches of 256x256 px with 2,500 tiles on a Vulkan device: one alone, and 16 that share its dispatches.
 //!
-//! `cargo bench --bench cells_lanes -- [--lanes L] [--evals E] [--candidates K]`; evals are those of each search.
+//! `cargo bench --bench cells_lanes -- [--lanes L] [--evals E] [--candidates K,..]`; evals are those of each search. Prints evals per
+//! second, the best of three runs each, in turn.
+
+#![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
 mod common;
 
 use std::time::Instant;
 
+use clap::Parser;
 use smalti::engine::SearchCrew;
 use smalti::evolve::cells::Budget;
 use smalti::evolve::style::Style;
@@ -13,10 +17,20 @@ use smalti::gpu::VulkanLanes;
 use smalti::model::cells::Course;
 use smalti::vk::Timing;
 
-/// The number after a flag.
-fn given(flag: &str) -> Option<u64> {
-    let mut arguments = std::env::args().skip_while(|argument| argument != flag);
-    arguments.nth(1).map(|value| value.parse().unwrap_or_else(|_| panic!("{flag}: {value} is no number")))
+#[derive(Parser)]
+struct Arguments {
+    /// Searches at once.
+    #[arg(long, default_value_t = 16)]
+    lanes: u64,
+    /// Evals of each.
+    #[arg(long, default_value_t = 200_000)]
+    evals: u64,
+    /// Candidates of a step.
+    #[arg(long, value_delimiter = ',', default_value = "1,8")]
+    candidates: Vec<u32>,
+    /// Said by cargo.
+    #[arg(long, hide = true)]
+    bench: bool,
 }
 
 /// Seconds and evals of so many searches at once, each from nothing to the end of its budget.
@@ -40,10 +54,9 @@ fn search(lanes: VulkanLanes, course: &Course, (lane_count, evals): (u64, u64)) 
 
 fn main() {
     let device = common::device();
-    let lane_count = given("--lanes").unwrap_or(16);
-    let evals = given("--evals").unwrap_or(200_000);
+    let Arguments { lanes: lane_count, evals, candidates, .. } = Arguments::parse();
     let target = common::target(256, 256);
-    for candidates in given("--candidates").map_or(vec![1, 8], |candidates| vec![candidates as u32]) {
+    for candidates in candidates {
         let course = common::cells::course(&target, &Style::free(), 2_500, candidates);
         let run = |counts| {
             let lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
