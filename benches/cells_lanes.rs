@@ -1,11 +1,16 @@
-//! Cells searches of 256x256 px with 2,500 tiles on a Vulkan device: one alone, and 16 that share its dispatches.
+//! Cells searches of 256x256 px with 2,500 tiles on a Vulkan device: 16 one by one, and as lanes that share its
+//! dispatches.
 //!
-//! `cargo bench --bench cells_lanes -- [--lanes L] [--evals E] [--candidates K]`; evals are those of each search.
+//! `cargo bench --bench cells_lanes -- [--lanes L] [--evals E] [--candidates K,..]`; evals are those of each search. Prints evals per
+//! second, the best of three runs each, in turn.
+
+#![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
 mod common;
 
 use std::time::Instant;
 
+use clap::Parser;
 use smalti::engine::SearchCrew;
 use smalti::evolve::cells::Budget;
 use smalti::evolve::style::Style;
@@ -13,54 +18,69 @@ use smalti::gpu::VulkanLanes;
 use smalti::model::cells::Course;
 use smalti::vk::Timing;
 
-/// The number after a flag.
-fn given(flag: &str) -> Option<u64> {
-    let mut arguments = std::env::args().skip_while(|argument| argument != flag);
-    arguments.nth(1).map(|value| value.parse().unwrap_or_else(|_| panic!("{flag}: {value} is no number")))
+#[derive(Parser)]
+struct Arguments {
+    /// Searches.
+    #[arg(long, default_value_t = 16)]
+    lanes: u64,
+    /// Evals of each.
+    #[arg(long, default_value_t = 200_000)]
+    evals: u64,
+    /// Candidates of a step.
+    #[arg(long, value_delimiter = ',', default_value = "1,8")]
+    candidates: Vec<u32>,
+    /// Said by cargo.
+    #[arg(long, hide = true)]
+    bench: bool,
 }
 
-/// Seconds and evals of so many searches at once, each from nothing to the end of its budget.
-fn search(lanes: VulkanLanes, course: &Course, (lane_count, evals): (u64, u64)) -> (f64, u64) {
-    let mut crew = SearchCrew::new(Box::new(lanes));
+/// Evals per second of searches of which so many are at work at once, each from nothing to the end of its budget.
+fn speed(mut lanes: SearchCrew, course: &Course, (at_once, count): (usize, u64), evals: u64) -> f64 {
     let budget = Budget { evals, target_sae: None, patience: None };
     let mut course = course.clone();
-    let begun = Instant::now();
-    for ticket in 0..lane_count {
-        course.rules.seed = ticket;
-        assert!(crew.admit(ticket, course.clone(), (None, budget)).expect("it fits"), "no room for {ticket} lanes");
-    }
+    let mut tickets = 0..count;
     let mut made = 0;
-    while !crew.is_empty() {
-        for finished in crew.step().expect("the device works") {
+    let begun = Instant::now();
+    loop {
+        while lanes.len() < at_once
+            && let Some(ticket) = tickets.next()
+        {
+            course.rules.seed = ticket;
+            assert!(
+                lanes.admit(ticket, course.clone(), (None, budget)).expect("it fits"),
+                "no room for {ticket} lanes"
+            );
+        }
+        if lanes.is_empty() {
+            return made as f64 / begun.elapsed().as_secs_f64();
+        }
+        for finished in lanes.step().expect("the device works") {
             made += finished.outcome.expect("no search fails").standing.evals;
         }
     }
-    (begun.elapsed().as_secs_f64(), made)
 }
 
 fn main() {
     let device = common::device();
-    let lane_count = given("--lanes").unwrap_or(16);
-    let evals = given("--evals").unwrap_or(200_000);
+    let Arguments { lanes: lane_count, evals, candidates, .. } = Arguments::parse();
     let target = common::target(256, 256);
-    for candidates in given("--candidates").map_or(vec![1, 8], |candidates| vec![candidates as u32]) {
+    for candidates in candidates {
         let course = common::cells::course(&target, &Style::free(), 2_500, candidates);
-        let run = |counts| {
+        let run = |at_once, (count, evals)| {
             let lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
-            let (seconds, made) = search(lanes, &course, counts);
-            made as f64 / seconds
+            speed(SearchCrew::new(Box::new(lanes)), &course, (at_once, count), evals)
         };
         // Shaders are compiled at their first use.
-        run((1, 1_000));
+        run(2, (2, 1_000));
         let mut best = [0.0_f64; 2];
         for _ in 0..3 {
-            for (best, count) in best.iter_mut().zip([1, lane_count]) {
-                *best = best.max(run((count, evals)));
+            for (best, at_once) in best.iter_mut().zip([1, lane_count as usize]) {
+                *best = best.max(run(at_once, (lane_count, evals)));
             }
         }
         let [one, many] = best;
         println!(
-            "{candidates} candidates: 1 lane {one:.0} evals/s, {lane_count} lanes {many:.0} evals/s ({:.2})",
+            "{candidates} candidates: one by one {one:.0} evals/s, {lane_count} lanes {many:.0} evals/s ({:.2})",
             many / one
         );
     }

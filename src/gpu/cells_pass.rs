@@ -98,9 +98,17 @@ impl Stage {
     }
 }
 
+/// How many lanes a dispatch serves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Crowd {
+    One = 0,
+    Many = 1,
+}
+
 /// The pipelines for lanes of one variant.
 struct Steps {
     variant: Variant,
+    crowd: Crowd,
     cells: Arc<ComputePipeline>,
     /// What begins marginal fitness fly by fly and adds to it pixel by pixel, if the cells do not bring it up to date.
     fitness: Option<[Arc<ComputePipeline>; 2]>,
@@ -154,7 +162,8 @@ impl CellsPass {
             for ((stage, pipeline), workgroups) in stages.iter_mut().zip(&self.dealing).zip([flies, 1, flies, flies]) {
                 stage.add(team, pipeline, workgroups);
             }
-            let Steps { cells, fitness, .. } = self.steps_of(team.variant)?;
+            let crowd = if team.lanes.len() == 1 { Crowd::One } else { Crowd::Many };
+            let Steps { cells, fitness, .. } = self.steps_of(team.variant, crowd)?;
             steps[0].add(team, cells, team.most(|(plan, _)| u64::from(plan.cell_count)));
             if let Some([begin, add]) = fitness {
                 steps[1].add(team, begin, flies);
@@ -173,10 +182,10 @@ impl CellsPass {
         Ok(())
     }
 
-    fn steps_of(&mut self, variant: Variant) -> Result<&Steps> {
-        let place = self.steps.iter().position(|steps| steps.variant == variant);
+    fn steps_of(&mut self, variant: Variant, crowd: Crowd) -> Result<&Steps> {
+        let place = self.steps.iter().position(|steps| (steps.variant, steps.crowd) == (variant, crowd));
         if place.is_none() {
-            self.steps.push(Steps::create(&self.device, variant)?);
+            self.steps.push(Steps::create(&self.device, variant, crowd)?);
         }
         Ok(&self.steps[place.unwrap_or(self.steps.len() - 1)])
     }
@@ -223,8 +232,8 @@ impl CellsPass {
 }
 
 impl Steps {
-    fn create(device: &Arc<Device>, variant: Variant) -> Result<Self> {
-        let constants = variant.specialization();
+    fn create(device: &Arc<Device>, variant: Variant, crowd: Crowd) -> Result<Self> {
+        let constants = [variant.specialization(), vec![(10, crowd as u32)]].concat();
         let fitness = |part: u32| {
             let constants = [&constants[..], &[(9, part)]].concat();
             create_pipeline(device, "cells_fitness", shaders::CELLS_FITNESS, &constants)
@@ -234,6 +243,7 @@ impl Steps {
             if is_translucent { ("cells_glazed", shaders::CELLS_GLAZED) } else { ("cells", shaders::CELLS) };
         Ok(Self {
             variant,
+            crowd,
             cells: create_pipeline(device, name, module, &constants)?,
             fitness: if is_translucent { Some([fitness(0)?, fitness(1)?]) } else { None },
         })

@@ -97,11 +97,11 @@ fn refill_mid_round(device: &Arc<Device>) {
         lanes.ask(lane, 3).expect("the device works");
     }
     let is_mid_round = |lanes: &VulkanLanes, lane: usize| lanes.is_busy(lane) && lanes.standing(lane).evals > 0;
-    for next in 4..all.len() {
+    for (next, (_, course)) in all.iter().enumerate().skip(4) {
         lanes.work().expect("the device works");
         let (_, leaving) = taken.remove(0);
         lanes.dismiss(leaving);
-        let lane = admit(&mut lanes, &all[next].1, shape);
+        let lane = admit(&mut lanes, course, shape);
         lanes.ask(lane, 3).expect("the device works");
         taken.push((next, lane));
         if next == 4 {
