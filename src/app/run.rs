@@ -52,6 +52,7 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     row.device = Some(selected.label().to_owned());
 
     let prepared = Prepared::load(options, row)?;
+    prepared.check_memory()?;
     let Prepared { job, provenances, memory_bytes } = &prepared;
     if options.verbosity > Verbosity::Quiet {
         say_notes(job, options, &selected);
