@@ -146,7 +146,11 @@ impl Journal {
 
     fn append_whole(&mut self, line: &str) -> io::Result<()> {
         let mut bytes = format!("{line}\n").into_bytes();
-        if self.file.seek(SeekFrom::End(0))? > 0 {
+        if !self.file.metadata()?.is_file() {
+            return self.file.write_all(&bytes);
+        }
+        let length = self.file.seek(SeekFrom::End(0))?;
+        if length > 0 {
             self.file.seek(SeekFrom::End(-1))?;
             let mut last = [0];
             self.file.read_exact(&mut last)?;
@@ -154,7 +158,12 @@ impl Journal {
                 bytes.insert(0, b'\n');
             }
         }
-        self.file.write_all(&bytes)
+        let written = self.file.write_all(&bytes);
+        if written.is_err() {
+            // A half line tells nothing. If it cannot be taken away, the next line ends it.
+            let _ = self.file.set_len(length);
+        }
+        written
     }
 }
 
@@ -171,6 +180,19 @@ pub fn check_writable(path: &Path) -> Result<()> {
         Place::File { target, .. } => create_beside(&target)?.close(),
     };
     check().map_err(|error| output_error(path, &error))
+}
+
+/// Whether files can be written into `folder` now, found out without leaving anything behind.
+///
+/// # Errors
+/// [`Error::Output`] about the folder.
+pub fn check_folder_writable(folder: &Path) -> Result<()> {
+    create_in(folder).and_then(NamedTempFile::close).map_err(|error| match error.kind() {
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            Error::output(folder, "the folder may not be written to; change its permissions, or name another one")
+        }
+        _ => output_error(folder, &error),
+    })
 }
 
 /// What a path leads to.
@@ -206,7 +228,10 @@ fn names_a_folder(path: &Path) -> bool {
 
 /// An empty temporary file in the folder of `target`: only within one file system is a rename a single step.
 fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
-    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    create_in(target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
+}
+
+fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
@@ -231,30 +256,36 @@ fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
 }
 
 /// Removes the temporary files that processes left in `folder` when they were killed. Those of living processes are locked, and
-/// stay.
+/// stay, and so do those that belong to somebody else.
 ///
 /// # Errors
 /// [`Error::Output`] if the folder cannot be read, or such a file cannot be removed.
 pub fn sweep(folder: &Path) -> Result<()> {
     let sweep = || -> io::Result<()> {
         for entry in fs::read_dir(folder)? {
-            let path = entry?.path();
-            let name = path.file_name().unwrap_or_default().as_encoded_bytes();
-            if !name.starts_with(PREFIX.as_bytes()) || !name.ends_with(SUFFIX.as_bytes()) {
-                continue;
-            }
-            let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
-            let file = match File::open(&path) {
-                Err(error) if is_gone(&error) => continue,
-                file => file?,
-            };
-            if file.try_lock().is_ok() {
-                fs::remove_file(&path).or_else(|error| if is_gone(&error) { Ok(()) } else { Err(error) })?;
+            let entry = entry?;
+            let name = entry.file_name();
+            let name = name.as_encoded_bytes();
+            let is_named_so = name.starts_with(PREFIX.as_bytes()) && name.ends_with(SUFFIX.as_bytes());
+            // To open a pipe would wait for its writer.
+            if is_named_so && entry.file_type()?.is_file() {
+                remove_unless_in_use(&entry.path())?;
             }
         }
         Ok(())
     };
     sweep().map_err(|error| output_error(folder, &error))
+}
+
+fn remove_unless_in_use(path: &Path) -> io::Result<()> {
+    let remove = || -> io::Result<()> {
+        let file = File::open(path)?;
+        if file.try_lock().is_ok() { fs::remove_file(path) } else { Ok(()) }
+    };
+    remove().or_else(|error| match error.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied => Ok(()),
+        _ => Err(error),
+    })
 }
 
 /// Gives a temporary file the name of its target, and the permissions of the file that it replaces.
@@ -279,7 +310,8 @@ pub fn is_disk_full(error: &Error) -> bool {
 
 fn output_error(path: &Path, error: &io::Error) -> Error {
     use io::ErrorKind::{
-        IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull,
+        FileTooLarge, IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem,
+        StorageFull,
     };
     let reason = match error.kind() {
         IsADirectory => "is a folder; name a file in it".to_owned(),
@@ -288,6 +320,9 @@ fn output_error(path: &Path, error: &io::Error) -> Error {
             "its folder may not be written to; change its permissions, or name another one".to_owned()
         }
         StorageFull | QuotaExceeded => DISK_FULL.to_owned(),
+        FileTooLarge => {
+            "is larger than a file may be here; raise the limit (ulimit -f), or name another disk".to_owned()
+        }
         _ => format!("cannot be written ({error}); name another file"),
     };
     Error::output(path, reason)

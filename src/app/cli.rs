@@ -65,6 +65,14 @@ impl Cli {
         })
     }
 
+    /// Whether `flag`, which takes a value, was typed, rather than set by the environment.
+    pub(super) fn has_typed(&self, flag: &str) -> bool {
+        let tokens = self.typed.iter().map(|token| token.to_string_lossy()).take_while(|token| token != "--");
+        tokens
+            .into_iter()
+            .any(|token| token.strip_prefix(flag).is_some_and(|rest| rest.is_empty() || rest.starts_with('=')))
+    }
+
     /// The flags that decide a picture, if `flags` were typed, too; each of them goes before what was typed.
     ///
     /// # Errors

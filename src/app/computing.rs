@@ -28,12 +28,12 @@ pub(super) struct ComputingArgs {
 pub(super) struct DevicesArg {
     /// Several devices instead of one, each with pictures of its own: all (every hardware GPU), or a list with commas of what
     /// --device takes
-    #[arg(long, value_name = "all|LIST", conflicts_with = "device")]
+    #[arg(long, value_name = "all|LIST")]
     pub devices: Option<String>,
 }
 
 impl DevicesArg {
-    /// Opens the devices: those of the list, or the one of `--device`.
+    /// Opens the devices: those of the list, or else the one of `--device` or SMALTI_DEVICE.
     ///
     /// # Errors
     /// [`Error::NoSuitableDevice`] if one of them is not there, or for `all` none; [`Error::Usage`] if the list is empty.

@@ -2,7 +2,7 @@
 
 use std::ffi::OsStr;
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::options::Overwrite;
 use super::provenance::{self, Ending};
@@ -208,17 +208,35 @@ pub(super) fn is_one_of(place: &Path, paths: &[&Path]) -> bool {
     paths.iter().any(|path| place == place_of(path))
 }
 
-/// One name for one file, however it was written.
+/// One name for one file, however it was written, even if its folder is still to be made.
 pub(super) fn place_of(path: &Path) -> PathBuf {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    path.canonicalize()
-        .or_else(|_| Ok(folder.canonicalize()?.join(path.file_name().unwrap_or_default())))
-        .unwrap_or_else(|_: std::io::Error| path.to_owned())
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    for known in absolute.ancestors() {
+        let Ok(mut place) = known.canonicalize() else { continue };
+        let unknown = absolute.strip_prefix(known).unwrap_or(Path::new(""));
+        // What does not exist is no link, so that .. leads back.
+        unknown.components().for_each(|part| match part {
+            Component::ParentDir => drop(place.pop()),
+            Component::CurDir => {}
+            part => place.push(part),
+        });
+        return place;
+    }
+    absolute
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_has_one_place_even_in_a_folder_that_is_still_to_be_made() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let place = |name: &str| place_of(&folder.path().join(name));
+        assert_eq!(place("new/deep/a.png"), place("new/./x/../deep/a.png"));
+        assert_ne!(place("new/deep/a.png"), place("new/a.png"));
+        assert!(place("new/a.png").is_absolute());
+    }
 
     #[test]
     fn an_output_in_the_place_of_any_input_is_refused_by_name() {

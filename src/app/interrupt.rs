@@ -53,6 +53,9 @@ impl Interrupt {
         for signal in SIGNALS {
             flag::register(signal, Arc::clone(&self.requested))?;
         }
+        // Else a file that becomes larger than `ulimit -f` allows would end the process; so the write fails.
+        #[cfg(unix)]
+        flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
         self.register_arming(&mut self.arming())
     }
 

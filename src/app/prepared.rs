@@ -33,7 +33,7 @@ impl Prepared {
     /// Reads and checks the picture of `options`; `row` takes in what is known then.
     ///
     /// # Errors
-    /// As [`Job::load`]; [`Error::TooLarge`] if the work does not fit into memory.
+    /// As [`Job::load`]; [`Error::Usage`] if a format cannot hold the picture.
     pub(super) fn load(options: &EvolveOptions, row: &mut Row) -> Result<Self> {
         let began = Instant::now();
         let _span = options.tracer.span("load").tell("picture", row.id.as_str());
@@ -45,6 +45,14 @@ impl Prepared {
         row.key = Some(provenances.of_row(options).key().to_owned());
         let memory_bytes = check_job(options, &job)?;
         Ok(Self { job, provenances, memory_bytes })
+    }
+
+    /// Refuses work that does not fit into the memory that is free now.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`].
+    pub(super) fn check_memory(&self) -> Result<()> {
+        memory::check(self.memory_bytes)
     }
 
     /// Evolves the picture and draws its best population.
@@ -87,7 +95,6 @@ fn check_job(options: &EvolveOptions, job: &Job) -> Result<u64> {
     )
     .saturating_add(list_bytes)
     .saturating_add(search_bytes);
-    memory::check(needed_bytes)?;
     Ok(needed_bytes)
 }
 

@@ -81,6 +81,7 @@ fn evolve_picture(
     row.device = Some(selected.label().to_owned());
 
     let prepared = Prepared::load(options, row)?;
+    prepared.check_memory()?;
     let Prepared { job, provenances, memory_bytes } = &prepared;
     if options.verbosity > Verbosity::Quiet {
         say_notes(job, options, &selected);

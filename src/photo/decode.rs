@@ -17,6 +17,8 @@ pub const SIDE_MAX_PX: u32 = 65_535;
 pub const PIXEL_COUNT_MAX: u64 = 1 << 28;
 /// Most bytes that a decoder may allocate: [`PIXEL_COUNT_MAX`] pixels of four floats.
 const DECODE_BYTES_MAX: u64 = PIXEL_COUNT_MAX * 16;
+/// Bytes per pixel while a picture is decoded, of up to eight: as it is stored, in sRGB, and turned upright.
+const BYTES_PER_DECODED_PIXEL: u64 = 16;
 /// Most bytes of a file that is read.
 const FILE_BYTES_MAX: u64 = 1 << 32;
 /// Bytes that tell the format of every picture that is read.
@@ -95,6 +97,21 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     Ok(Loaded { photo, transparent, original_width_px, original_height_px, sha256, warnings })
 }
 
+/// About how many bytes it takes to decode the picture at `path`, by the size that its header tells; 0 if that is none, or one that
+/// is refused.
+#[must_use]
+pub fn decoding_bytes(path: &Path) -> u64 {
+    let size = || {
+        let mut reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
+        reader.limits(limits());
+        reader.format().filter(|&format| is_read(format))?;
+        reader.into_dimensions().ok()
+    };
+    size()
+        .filter(|&size| check_size(size).is_ok())
+        .map_or(0, |(width_px, height_px)| u64::from(width_px) * u64::from(height_px) * BYTES_PER_DECODED_PIXEL)
+}
+
 /// The last chunk of every PNG, with its checksum.
 const PNG_END: [u8; 12] = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xAE, 0x42, 0x60, 0x82];
 
@@ -157,8 +174,12 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
 
 /// The format that the first bytes of a file tell, if it is one that is read.
 pub(super) fn known_format(bytes: &[u8]) -> Option<ImageFormat> {
+    image::guess_format(bytes).ok().filter(|&format| is_read(format))
+}
+
+fn is_read(format: ImageFormat) -> bool {
     use ImageFormat::{Bmp, Gif, Jpeg, Png, Tiff, WebP};
-    image::guess_format(bytes).ok().filter(|format| matches!(format, Png | Jpeg | WebP | Tiff | Bmp | Gif))
+    matches!(format, Png | Jpeg | WebP | Tiff | Bmp | Gif)
 }
 
 /// The upright 8-bit sRGB picture in `bytes`, as [`color::to_srgb`] makes it, or a sentence that says why there is none.
@@ -185,9 +206,7 @@ pub(super) struct Raw {
 pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat) -> Result<Raw, String> {
     let broken = |error: ImageError| why_undecodable(format, error);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(DECODE_BYTES_MAX);
-    reader.limits(limits);
+    reader.limits(limits());
     let mut decoder = reader.into_decoder().map_err(broken)?;
     check_size(decoder.dimensions())?;
     // The JPEG decoder fills what is missing with grey and calls it a success.
@@ -201,6 +220,12 @@ pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat) -> Result<Raw, Strin
 }
 
 /// Refuses sizes that are nothing or too much, before anything of that size is allocated.
+fn limits() -> Limits {
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(DECODE_BYTES_MAX);
+    limits
+}
+
 fn check_size((width_px, height_px): (u32, u32)) -> Result<(), String> {
     if width_px == 0 || height_px == 0 {
         return Err(format!("the picture has no pixels ({width_px}x{height_px}); save it anew"));

@@ -3,6 +3,8 @@
 #![allow(missing_docs, reason = "test names are sentences; only code that others call needs docs")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test that it is in")]
 
+mod batch;
+mod batch_resume;
 mod bench;
 mod canary;
 mod cells;

@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::Read;
+use std::path::Path;
 
 use clap::ValueEnum;
 use serde::de::IgnoredAny;
@@ -14,6 +15,7 @@ use crate::app::provenance::{self, Story};
 use crate::archive;
 use crate::error::{Error, Result};
 use crate::openraster;
+use crate::output;
 use crate::photo;
 
 /// What `--on-exists` may be.
@@ -57,7 +59,7 @@ pub(super) fn is_skipped(outputs: &[Destination], on_exists: OnExists) -> Result
 /// Looks at the outputs once the key of the picture is known.
 ///
 /// # Errors
-/// [`Error::Output`] if a file is there that smalti did not make.
+/// [`Error::Output`] if a file is there that smalti did not make, or nothing can be written.
 pub(super) fn judge(options: &EvolveOptions, prepared: &Prepared, on_exists: OnExists) -> Result<Verdict> {
     let is_there = |output: &Destination| output.path.symlink_metadata().is_ok();
     let mut to_write = options.outputs.clone();
@@ -79,25 +81,60 @@ pub(super) fn judge(options: &EvolveOptions, prepared: &Prepared, on_exists: OnE
             }
         }
     }
+    to_write.iter().try_for_each(check_place)?;
     Ok(Verdict::Write(to_write))
 }
 
-/// What the file at `output` tells, if it is whole and has this key; nothing if it may be replaced.
+/// Refuses places that nothing can be written to, before the work is done: folders, pipes, and what is below a file.
+fn check_place(output: &Destination) -> Result<()> {
+    if output.is_stream() {
+        let reason = "is there and is no file but a pipe or a device; move it away, or name another folder";
+        return Err(Error::output(&output.path, reason));
+    }
+    match output.path.parent().map(Path::try_exists) {
+        // It will be made.
+        Some(Ok(false)) => Ok(()),
+        _ => output::check_writable(&output.path),
+    }
+}
+
+/// What the file at `output` tells, if it is whole and has this key; nothing if it may be replaced, as far as that is known now
+/// ([`check_remade`]).
 fn told_by_same(output: &Destination, key: &str, fly_count: usize) -> Result<Option<Map<String, Value>>> {
     if !output.path.is_file() {
         return Ok(None);
     }
-    let told = provenance::told_by_file(output);
-    if !is_whole(output, fly_count) {
-        return Ok(None);
+    let is_whole = is_whole(output, fly_count);
+    match provenance::told_by_file(output) {
+        // What ends in zeros may be ours, and have lost what it told in a crash of the system.
+        None if is_whole && !ends_in_zero(output) => Err(foreign(output)),
+        None => Ok(None),
+        Some(told) => {
+            let is_same = Story::told(&told).is_some_and(|story| story.is_of(key) && story.is_complete);
+            Ok((is_whole && is_same).then_some(told))
+        }
     }
-    let Some(told) = told else {
-        let reason =
-            "is there and was not made by smalti; name another folder, or replace it with --on-exists overwrite";
-        return Err(Error::output(&output.path, reason));
-    };
-    let is_same = Story::told(&told).is_some_and(|story| story.is_of(key) && story.is_complete);
-    Ok(is_same.then_some(told))
+}
+
+/// Refuses to replace a file that does not tell that smalti made it, unless it is an output of this picture that was cut short:
+/// then `bytes`, which are to be written now, begin with what is left of it, and zeros may follow that a file system put there.
+///
+/// # Errors
+/// [`Error::Output`] that names the file.
+pub(super) fn check_remade(output: &Destination, bytes: &[u8], on_exists: OnExists) -> Result<()> {
+    if on_exists == OnExists::Overwrite || !output.path.is_file() || provenance::told_by_file(output).is_some() {
+        return Ok(());
+    }
+    let is_left_of_it = read(output).is_some_and(|old| {
+        let length = old.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+        bytes.starts_with(&old[..length])
+    });
+    if is_left_of_it { Ok(()) } else { Err(foreign(output)) }
+}
+
+fn foreign(output: &Destination) -> Error {
+    let reason = "is there and was not made by smalti; name another folder, or replace it with --on-exists overwrite";
+    Error::output(&output.path, reason)
 }
 
 /// Whether nothing of the file is missing, not even its last byte: what is cut short must be made anew.
@@ -107,15 +144,24 @@ fn is_whole(output: &Destination, fly_count: usize) -> bool {
         Content::Png | Content::Jpeg | Content::WebP => photo::is_whole(&output.path),
         Content::OpenRaster => openraster::is_whole(&output.path),
         Content::Population => archive::read(&output.path).is_ok(),
-        Content::Svg => ends_with(b"</svg>\n"),
+        Content::Svg => ends_with(b"</svg>\n") && !has_zeros(output),
         Content::Json => {
             ends_with(b"\n") && read(output).is_some_and(|bytes| serde_json::from_slice::<IgnoredAny>(&bytes).is_ok())
         }
         // A line of names, and a line for each fly.
         Content::Csv => read(output).is_some_and(|bytes| {
-            bytes.ends_with(b"\n") && bytes.iter().filter(|&&byte| byte == b'\n').count() == fly_count + 1
+            let lines = bytes.iter().filter(|&&byte| byte == b'\n').count();
+            bytes.ends_with(b"\n") && lines == fly_count + 1 && !bytes.contains(&0)
         }),
     }
+}
+
+fn ends_in_zero(output: &Destination) -> bool {
+    read(output).is_some_and(|bytes| bytes.ends_with(&[0]))
+}
+
+fn has_zeros(output: &Destination) -> bool {
+    read(output).is_some_and(|bytes| bytes.contains(&0))
 }
 
 fn read(output: &Destination) -> Option<Vec<u8>> {

@@ -31,6 +31,13 @@ impl Gate {
     }
 }
 
+impl Permit<'_> {
+    /// Whether it was only given out because nobody else had one.
+    pub(super) fn is_beyond_limit(&self) -> bool {
+        self.bytes > self.gate.limit_bytes
+    }
+}
+
 impl Drop for Permit<'_> {
     fn drop(&mut self) {
         let mut used = self.gate.used_bytes.lock().unwrap_or_else(PoisonError::into_inner);

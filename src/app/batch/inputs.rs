@@ -5,9 +5,12 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::app::destination::place_of;
 use crate::error::{Error, Result};
 use crate::photo;
 
+/// What a pattern is made with.
+const WILD: [char; 3] = ['*', '?', '['];
 /// Endings of the files of a folder that are taken for pictures, in lower case.
 const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif"];
 
@@ -27,20 +30,24 @@ pub(super) enum Depth {
 }
 
 /// The files that `named` stand for: a folder for the pictures in it, in natural order; what exists for itself; anything
-/// else with `*`, `?` or `[` for what matches. Each file comes once.
+/// else with `*`, `?` or `[` for what matches. Each file comes once. If the folder `outputs` is below a folder that is named, what
+/// is in it does not count: else the next run would take the results of this one for pictures.
 ///
-/// What does not exist and is no pattern is a picture that will fail: it must not stop the others.
+/// What does not exist and is no pattern, and what cannot be read below a folder, is a picture that will fail: it must not
+/// stop the others.
 ///
 /// # Errors
-/// [`Error::Input`] if a folder cannot be read; [`Error::Usage`] if a pattern is wrong.
-pub(super) fn find(named: &[PathBuf], depth: Depth) -> Result<Vec<Found>> {
+/// [`Error::Input`] if a folder that is named cannot be read; [`Error::Usage`] if a pattern is wrong.
+pub(super) fn find(named: &[PathBuf], depth: Depth, outputs: &Path) -> Result<Vec<Found>> {
+    let outputs = place_of(outputs);
     let mut found = Vec::new();
     for path in named {
         let text = path.to_string_lossy();
         if path.is_dir() {
-            list(path, Path::new(""), depth, &mut found)?;
-        } else if path.symlink_metadata().is_err() && text.contains(['*', '?', '[']) {
-            found.extend(matches(&text)?);
+            let unreadable = |error| Error::input(path, photo::why_unreadable(&error));
+            list(path, Path::new(""), (depth, &outputs), &mut found).map_err(unreadable)?;
+        } else if path.symlink_metadata().is_err() && text.contains(WILD) {
+            found.extend(matches(&text, &outputs)?);
         } else {
             let relative = path.file_name().map_or_else(|| path.clone(), PathBuf::from);
             found.push(Found { path: path.clone(), relative });
@@ -53,13 +60,16 @@ pub(super) fn find(named: &[PathBuf], depth: Depth) -> Result<Vec<Found>> {
 
 /// The pictures in `folder`, and with [`Depth::Recursive`] in those below it: first its own, then folder by folder. A folder with
 /// the name of a picture is taken for one, which fails and is told. Links to folders are not followed: they may lead in a circle.
-fn list(folder: &Path, relative: &Path, depth: Depth, found: &mut Vec<Found>) -> Result<()> {
-    let unreadable = |error| Error::input(folder, photo::why_unreadable(&error));
+fn list(
+    folder: &Path,
+    relative: &Path,
+    (depth, outputs): (Depth, &Path),
+    found: &mut Vec<Found>,
+) -> std::io::Result<()> {
     let mut names = Vec::new();
-    for entry in fs::read_dir(folder).map_err(unreadable)? {
-        let entry = entry.map_err(unreadable)?;
-        let is_folder = entry.file_type().map_err(unreadable)?.is_dir();
-        names.push((entry.file_name(), is_folder));
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        names.push((entry.file_name(), entry.file_type()?.is_dir()));
     }
     names.retain(|(name, _)| !name.as_encoded_bytes().starts_with(b"."));
     names.sort_by(|(one, _), (other, _)| compare(one, other));
@@ -67,26 +77,56 @@ fn list(folder: &Path, relative: &Path, depth: Depth, found: &mut Vec<Found>) ->
         names.into_iter().partition(|(name, is_folder)| *is_folder && !is_named_like_a_picture(Path::new(name)));
     let files = files.into_iter().filter(|(name, _)| is_named_like_a_picture(Path::new(name)));
     found.extend(files.map(|(name, _)| Found { path: folder.join(&name), relative: relative.join(&name) }));
-    if depth == Depth::Recursive {
-        folders.iter().try_for_each(|(name, _)| list(&folder.join(name), &relative.join(name), depth, found))?;
+    if depth == Depth::Flat {
+        return Ok(());
+    }
+    for (name, _) in folders {
+        let (path, relative) = (folder.join(&name), relative.join(&name));
+        if place_of(&path) != outputs && list(&path, &relative, (depth, outputs), found).is_err() {
+            found.push(Found { path, relative });
+        }
     }
     Ok(())
 }
 
-/// The files that a pattern matches, in natural order; relative to the folders that it names outright.
-fn matches(pattern: &str) -> Result<Vec<Found>> {
+/// The folder among `named` that would give the file `written` as a picture, the next time.
+pub(super) fn giver_of<'a>(written: &Path, named: &'a [PathBuf], (depth, outputs): (Depth, &Path)) -> Option<&'a Path> {
+    let (place, outputs) = (place_of(written), place_of(outputs));
+    let gives = |folder: &PathBuf| {
+        let folder = place_of(folder);
+        let is_left_out = outputs != folder && outputs.starts_with(&folder) && place.starts_with(&outputs);
+        match depth {
+            Depth::Flat => place.parent() == Some(&folder),
+            Depth::Recursive => place.starts_with(&folder) && !is_left_out,
+        }
+    };
+    if !is_named_like_a_picture(written) {
+        return None;
+    }
+    named.iter().filter(|path| path.is_dir()).find(|folder| gives(folder)).map(PathBuf::as_path)
+}
+
+/// The files that a pattern matches, in natural order; relative to the folders that it names outright, and without those in the
+/// folder `outputs` if that is below these.
+fn matches(pattern: &str, outputs: &Path) -> Result<Vec<Found>> {
     let paths = glob::glob(pattern).map_err(|error| {
         Error::Usage(format!(
             "{pattern}: not a pattern ({error}); write a * for any part of a name, as in 'photos/*.jpg'"
         ))
     })?;
-    let plain: PathBuf = Path::new(pattern)
-        .components()
-        .take_while(|part| !part.as_os_str().to_string_lossy().contains(['*', '?', '[']))
-        .collect();
+    let plain: PathBuf =
+        Path::new(pattern).components().take_while(|part| !part.as_os_str().to_string_lossy().contains(WILD)).collect();
+    let base = place_of(if plain.as_os_str().is_empty() { Path::new(".") } else { &plain });
+    let has_outputs = outputs != base && outputs.starts_with(&base);
+    let is_output =
+        |path: &Path| has_outputs && path.parent().is_some_and(|folder| place_of(folder).starts_with(outputs));
     let mut found = Vec::new();
     for path in paths {
-        let path = path.map_err(|error| Error::input(error.path(), photo::why_unreadable(error.error())))?;
+        // What cannot be looked into will fail by that name.
+        let path = path.unwrap_or_else(|error| error.path().to_owned());
+        if is_output(&path) || path == outputs {
+            continue;
+        }
         let relative = path.strip_prefix(&plain).unwrap_or(&path).to_owned();
         found.push(Found { path, relative });
     }
@@ -131,18 +171,43 @@ mod tests {
     fn folders_give_their_pictures_in_natural_order_and_what_is_below_only_if_asked() {
         let folder = folder();
         let named = [folder.path().to_owned()];
-        assert_eq!(relative(find(&named, Depth::Flat)), ["a.jpg", "odd.png"]);
+        let elsewhere = Path::new("elsewhere");
+        assert_eq!(relative(find(&named, Depth::Flat, elsewhere)), ["a.jpg", "odd.png"]);
         let all = ["a.jpg", "odd.png", "b/p2.PNG", "b/p10.png", "c/deep/x.webp"];
-        assert_eq!(relative(find(&named, Depth::Recursive)), all);
+        assert_eq!(relative(find(&named, Depth::Recursive, elsewhere)), all);
+    }
+
+    #[test]
+    fn what_is_in_the_output_folder_is_no_picture_of_the_folder_that_it_is_in() {
+        let folder = folder();
+        let at = |name: &str| folder.path().join(name);
+        let named = [folder.path().to_owned()];
+        assert_eq!(relative(find(&named, Depth::Recursive, &at("b/../b"))), ["a.jpg", "odd.png", "c/deep/x.webp"]);
+        assert_eq!(relative(find(&named, Depth::Recursive, &at("c"))), ["a.jpg", "odd.png", "b/p2.PNG", "b/p10.png"]);
+        assert_eq!(relative(find(&[at("**/p*")], Depth::Flat, &at("c"))), ["b/p2.PNG", "b/p10.png"]);
+        assert!(find(&[at("**/p*")], Depth::Flat, &at("b")).is_err(), "nothing is left");
+        assert_eq!(relative(find(&[at("b/*")], Depth::Flat, &at("b"))), ["p2.PNG", "p10.png"]);
+        for (written, depth, outputs, is_given) in [
+            ("a.png", Depth::Flat, "", true),
+            ("a.svg", Depth::Flat, "", false),
+            ("out/a.png", Depth::Flat, "out", false),
+            ("out/a.png", Depth::Recursive, "out", false),
+            ("b/a.png", Depth::Recursive, "", true),
+            ("b/a.png", Depth::Recursive, "out", true),
+        ] {
+            let giver = giver_of(&at(written), &named, (depth, &at(outputs)));
+            assert_eq!(giver.is_some(), is_given, "{written} {depth:?} {outputs}");
+        }
     }
 
     #[test]
     fn a_pattern_gives_what_it_matches_and_a_file_is_itself_even_if_it_is_not_there() {
         let folder = folder();
         let named = |names: &[&str]| names.iter().map(|name| folder.path().join(name)).collect::<Vec<_>>();
-        assert_eq!(relative(find(&named(&["*/p*"]), Depth::Flat)), ["b/p2.PNG", "b/p10.png"]);
+        let elsewhere = Path::new("elsewhere");
+        assert_eq!(relative(find(&named(&["*/p*"]), Depth::Flat, elsewhere)), ["b/p2.PNG", "b/p10.png"]);
         let twice = named(&["notes.txt", "gone.png", "notes.txt"]);
-        assert_eq!(relative(find(&twice, Depth::Flat)), ["notes.txt", "gone.png"]);
-        assert!(find(&named(&["*.tif"]), Depth::Flat).is_err(), "nothing matches");
+        assert_eq!(relative(find(&twice, Depth::Flat, elsewhere)), ["notes.txt", "gone.png"]);
+        assert!(find(&named(&["*.tif"]), Depth::Flat, elsewhere).is_err(), "nothing matches");
     }
 }

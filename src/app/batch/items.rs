@@ -2,6 +2,7 @@
 //! read.
 
 use std::collections::{HashMap, HashSet};
+use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -122,7 +123,7 @@ fn relative_of(input: &Path) -> PathBuf {
 /// The ids: as in the manifest, or else the path below the folder that was named, without its ending where that is still unlike
 /// all others.
 fn ids(drafts: &[Draft]) -> Result<Vec<String>> {
-    let short = |draft: &Draft| draft.relative.with_extension("").to_string_lossy().into_owned();
+    let short = |draft: &Draft| spelt(draft.relative.with_extension("").as_os_str());
     let given = |draft: &Draft| draft.row.id.clone();
     let mut counts: HashMap<String, usize> = HashMap::new();
     for draft in drafts {
@@ -132,7 +133,7 @@ fn ids(drafts: &[Draft]) -> Result<Vec<String>> {
     let id = |draft: &Draft| {
         let id = given(draft).unwrap_or_else(|| match short(draft) {
             id if counts.get(&id) == Some(&1) => id,
-            _ => draft.row.input.to_string_lossy().into_owned(),
+            _ => spelt(draft.row.input.as_os_str()),
         });
         if taken.insert(id.clone()) {
             Ok(id)
@@ -154,11 +155,10 @@ fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result
         }
     };
     let destination = |path: &PathBuf| {
-        let destination = Destination::for_result(&naming.folder.join(path))?;
         if path == Path::new("-") {
             return Err(Error::Usage(format!("{id}: a batch writes files; name one instead of -")));
         }
-        Ok(destination)
+        Destination::for_result(&naming.folder.join(path))
     };
     let outputs: Vec<Destination> = paths.iter().map(destination).collect::<Result<_>>()?;
     if outputs.is_empty() {
@@ -169,12 +169,12 @@ fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result
 
 /// Refuses outputs in the place of an input or of one another.
 fn check_places(items: &[Item]) -> Result<()> {
-    let inputs: HashMap<PathBuf, &Item> = items.iter().map(|item| (place_of(&item.input), item)).collect();
+    let inputs: HashSet<PathBuf> = items.iter().map(|item| only_place_of(&item.input)).collect();
     let mut written: HashMap<PathBuf, &Item> = HashMap::new();
     for item in items {
         for output in &item.outputs {
-            let (place, path) = (place_of(&output.path), output.path.display());
-            if inputs.contains_key(&place) {
+            let (place, path) = (only_place_of(&output.path), output.path.display());
+            if inputs.contains(&place) {
                 return Err(Error::Usage(format!("{path} is an input; name another folder for the outputs")));
             }
             if let Some(other) = written.insert(place, item) {
@@ -190,12 +190,30 @@ fn check_places(items: &[Item]) -> Result<()> {
     Ok(())
 }
 
+/// The place of a file, in small letters where files whose names differ only by that are one.
+fn only_place_of(path: &Path) -> PathBuf {
+    let place = place_of(path);
+    if cfg!(any(windows, target_os = "macos")) { place.to_string_lossy().to_lowercase().into() } else { place }
+}
+
+/// A name as text, with `%` and two digits for each byte that is none.
+pub(super) fn spelt(name: &OsStr) -> String {
+    let mut text = String::new();
+    for chunk in name.as_encoded_bytes().utf8_chunks() {
+        text.push_str(chunk.valid());
+        chunk.invalid().iter().for_each(|byte| text.push_str(&format!("%{byte:02X}")));
+    }
+    text
+}
+
 /// Refuses an order that cannot be kept: after a picture that is not of the same group, or after itself.
 fn check_order(items: &[Item]) -> Result<()> {
     let by_id: HashMap<&str, &Item> = items.iter().map(|item| (item.id.as_str(), item)).collect();
+    // Those whose order is known to lead to one that comes after none.
+    let mut kept: HashSet<&str> = HashSet::new();
     for item in items {
-        let mut at = item;
-        for _ in 0..=items.len() {
+        let (mut at, mut way) = (item, HashSet::from([item.id.as_str()]));
+        while !kept.contains(at.id.as_str()) {
             let Some(after) = &at.after else { break };
             let Some(first) = by_id.get(after.as_str()) else {
                 return Err(Error::Usage(format!("{}: comes after {after}, which is not in the batch", at.id)));
@@ -206,11 +224,12 @@ fn check_order(items: &[Item]) -> Result<()> {
                     at.id
                 )));
             }
-            if first.id == item.id {
-                return Err(Error::Usage(format!("{}: comes after itself; break the circle of after", item.id)));
+            if !way.insert(&first.id) {
+                return Err(Error::Usage(format!("{}: comes after itself; break the circle of after", first.id)));
             }
             at = first;
         }
+        kept.extend(way);
     }
     Ok(())
 }

@@ -32,6 +32,7 @@ use self::summary::Summary;
 use self::threads::IoThreads;
 use super::cli::{Cli, MessageArgs};
 use super::computing::{ComputingArgs, DevicesArg};
+use super::destination::place_of;
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::options::{EvolveOptions, Overwrite, Verbosity};
 use super::picture::PictureArgs;
@@ -142,6 +143,9 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
     let validation = if args.validate { Validation::On } else { Validation::Off };
     let computing = args.computing.check(validation)?;
     let shard = args.shard.map(|choice| choice.resolve(|name| std::env::var(name).ok())).transpose()?;
+    if args.devices.devices.is_some() && cli.has_typed("--device") {
+        return Err(Error::Usage("--devices names all devices, also a single one; drop --device".to_owned()));
+    }
     let items = find(args, cli)?;
     let all = items.len();
     let items = match shard {
@@ -161,6 +165,7 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
         });
         args.output.join(name)
     });
+    check_results(&results, args, &items)?;
     let mut journal = prepare_output(args, &items, &results)?;
     if verbosity > Verbosity::Quiet && shard.is_some() {
         report::say(&format!("smalti: {} of {all} pictures are in this shard", items.len()));
@@ -193,7 +198,7 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
     match fatal {
         Some(error) => Err(error),
         None if traced.is_err() => traced.map(|_| 0),
-        None if interrupt.is_requested() => Ok(EXIT_INTERRUPTED),
+        None if summary.left() > 0 => Ok(EXIT_INTERRUPTED),
         None if summary.failed() > 0 => Ok(EXIT_SOME_FAILED),
         None => Ok(0),
     }
@@ -202,7 +207,7 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
 /// Finds the pictures, and gives each its options and outputs.
 fn find(args: &BatchArgs, cli: &Cli) -> Result<Vec<Item>> {
     let depth = if args.recursive { Depth::Recursive } else { Depth::Flat };
-    let found = inputs::find(&args.inputs, depth)?;
+    let found = inputs::find(&args.inputs, depth, &args.output)?;
     let none = Path::new("-");
     let (manifest, rows) = match &args.manifest {
         Some(path) => (path.as_path(), manifest::read(path)?),
@@ -225,7 +230,35 @@ fn find(args: &BatchArgs, cli: &Cli) -> Result<Vec<Item>> {
     };
     let formats = check_formats(&args.formats)?;
     let naming = Naming { folder: &args.output, template: &args.name, formats: &formats };
-    items::gather(found, (manifest, rows), &options_with, &naming)
+    let items = items::gather(found, (manifest, rows), &options_with, &naming)?;
+    for output in items.iter().flat_map(|item| &item.outputs) {
+        if let Some(folder) = inputs::giver_of(&output.path, &args.inputs, (depth, &args.output)) {
+            return Err(Error::Usage(format!(
+                "{} would be taken for a picture of {} by the next run; name an output folder elsewhere or below it",
+                output.path.display(),
+                folder.display()
+            )));
+        }
+    }
+    Ok(items)
+}
+
+/// Refuses a file of the results that is something else: lines would be added to it.
+fn check_results(results: &Path, args: &BatchArgs, items: &[Item]) -> Result<()> {
+    if results == Path::new("-") {
+        return Err(Error::Usage("--results - is no file; name one, and print the lines with --json".to_owned()));
+    }
+    let place = place_of(results);
+    let manifest = args.manifest.iter().map(PathBuf::as_path);
+    let inputs = items.iter().map(|item| item.input.as_path()).chain(manifest);
+    let outputs = items.iter().flat_map(|item| &item.outputs).map(|output| output.path.as_path());
+    match inputs.chain(outputs).find(|&path| place_of(path) == place) {
+        Some(path) => Err(Error::Usage(format!(
+            "--results: {} is read or written by the batch; name another file",
+            path.display()
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// The formats as endings without a dot, each once.
@@ -243,10 +276,14 @@ fn prepare_output(args: &BatchArgs, items: &[Item], results: &Path) -> Result<Jo
     std::fs::create_dir_all(&args.output).map_err(|error| {
         Error::output(&args.output, format!("the folder cannot be created ({error}); name another one"))
     })?;
-    output::check_writable(&args.output.join("any"))?;
+    output::check_folder_writable(&args.output)?;
     let outputs = items.iter().flat_map(|item| &item.outputs).map(|output| output.path.as_path());
-    let folders: HashSet<&Path> = outputs.filter_map(Path::parent).filter(|folder| folder.is_dir()).collect();
-    folders.into_iter().try_for_each(output::sweep)?;
+    let folders: HashSet<&Path> = outputs.filter_map(Path::parent).collect();
+    folders
+        .iter()
+        .chain([&args.output.as_path()])
+        .filter(|folder| folder.is_dir())
+        .try_for_each(|folder| output::sweep(folder))?;
     Journal::open(results)
 }
 

@@ -1,6 +1,9 @@
 //! `--name`: what the outputs of a batch are called.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+
+use super::items::spelt;
 
 /// What a placeholder stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,14 +84,14 @@ pub(in crate::app) fn parse(text: &str) -> Result<NameTemplate, String> {
 impl NameTemplate {
     /// The name of the output in the format that `ext` is the ending of, relative to the output folder.
     pub(super) fn path(&self, known: &Known<'_>, ext: &str) -> PathBuf {
-        let text = |path: Option<&std::ffi::OsStr>| path.unwrap_or_default().to_string_lossy().into_owned();
+        let text = |name: Option<&OsStr>| spelt(name.unwrap_or_default());
         let spelt = self.pieces.iter().map(|piece| match piece {
             Piece::Text(text) => text.clone(),
             Piece::Part(Part::Stem) => text(known.relative.file_stem()),
             Piece::Part(Part::Suffix) => text(known.relative.extension()),
             Piece::Part(Part::Dir) => {
-                let folder = known.relative.parent().unwrap_or(Path::new("")).to_string_lossy();
-                if folder.is_empty() { ".".to_owned() } else { folder.into_owned() }
+                let folder = text(known.relative.parent().map(Path::as_os_str));
+                if folder.is_empty() { ".".to_owned() } else { folder }
             }
             Piece::Part(Part::Id) => known.id.to_owned(),
             Piece::Part(Part::Group) => known.group.unwrap_or_default().to_owned(),
@@ -121,5 +124,17 @@ mod tests {
         for text in ["{stem}", "{stem}.png", "{stem}{ext}", "{name}.{ext}", "{stem.{ext}", ""] {
             assert!(parse(text).is_err(), "{text}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_that_are_no_text_stay_apart() {
+        use std::os::unix::ffi::OsStrExt;
+        let name = |bytes: &[u8]| {
+            let known = Known { relative: Path::new(OsStr::from_bytes(bytes)), id: "", group: None, index: 0, seed: 0 };
+            parse("{dir}/{stem}.{ext}").expect("it is a name").path(&known, "png").display().to_string()
+        };
+        assert_eq!(name(b"caf\xE9/a\xFF.jpg"), "caf%E9/a%FF.png");
+        assert_eq!(name("caf\u{e9}.jpg".as_bytes()), "caf\u{e9}.png");
     }
 }

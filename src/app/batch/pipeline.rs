@@ -32,7 +32,7 @@ use crate::app::result::Evolved;
 use crate::app::shard::Shard;
 use crate::app::watch::Watchers;
 use crate::error::{Error, Result};
-use crate::output;
+use crate::{output, photo};
 
 /// Most pictures that wait to be evolved.
 const READ_AHEAD_MAX: usize = 16;
@@ -182,9 +182,17 @@ impl<'a> Pipeline<'a> {
         }
         check_is_file(&item.input)?;
         let options = item.options(self.tracer);
+        let reading = self.gate.enter(photo::decoding_bytes(&item.input));
         let prepared = Prepared::load(&options, row)?;
+        // Before the next permit is asked for: nobody waits while holding one.
+        drop(reading);
         for warning in &prepared.job.warnings {
             let _ = told.send(Told::Warning(format!("{}: {warning}", item.input.display())));
+        }
+        // To look whether an output is whole takes its pixels.
+        let permit = self.gate.enter(prepared.memory_bytes);
+        if permit.is_beyond_limit() {
+            prepared.check_memory()?;
         }
         let to_write = match existing::judge(&options, &prepared, self.on_exists)? {
             Verdict::Write(to_write) => to_write,
@@ -194,7 +202,6 @@ impl<'a> Pipeline<'a> {
                 return Ok(None);
             }
         };
-        let permit = self.gate.enter(prepared.memory_bytes);
         Ok(Some(Work { options, prepared, to_write, permit }))
     }
 
@@ -282,6 +289,9 @@ impl<'a> Pipeline<'a> {
         let _span = self.tracer.span("save").tell("picture", row.id.as_str());
         let outputs: Vec<&Destination> = to_write.iter().collect();
         let files = outputs::encode(&outputs, drawn, &prepared.provenances.told(ending))?;
+        for file in &files {
+            existing::check_remade(file.destination, &file.bytes, self.on_exists)?;
+        }
         for file in &files {
             let path = &file.destination.path;
             let folder = path.parent().unwrap_or(Path::new("."));

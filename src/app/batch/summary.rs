@@ -61,6 +61,11 @@ impl Summary {
         self.failures.len()
     }
 
+    /// How many nothing became of.
+    pub(super) fn left(&self) -> usize {
+        self.planned - self.done()
+    }
+
     fn done(&self) -> usize {
         self.complete + self.unchanged + self.skipped + self.failed()
     }
@@ -79,13 +84,12 @@ impl Summary {
     /// Prints the table.
     pub(super) fn print(&self, results: &Path) {
         let seconds = self.began.elapsed().as_secs_f64().max(1e-9);
-        let left = self.planned - self.done();
         let counts = [
             ("complete", self.complete),
             ("unchanged", self.unchanged),
             ("skipped", self.skipped),
             ("failed", self.failed()),
-            ("not begun", left),
+            ("not done", self.left()),
         ];
         for (name, count) in counts.into_iter().filter(|&(name, count)| count > 0 || name == "complete") {
             report::say(&format!("{name:<10} {:>9}", HumanCount(count as u64).to_string()));
