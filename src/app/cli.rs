@@ -9,6 +9,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use super::bench::BenchArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
+use super::merge::MergeArgs;
 use super::paper::PaperArgs;
 use super::picture::PictureArgs;
 use super::render::RenderArgs;
@@ -96,6 +97,10 @@ pub(super) enum Command {
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed with
     /// numpy, scipy and scikit-image. Of an animation the first frame is measured.
     Score(ScoreArgs),
+    /// Put the results of several shards or runs together
+    ///
+    /// Tells which pictures failed, and which are missing.
+    Merge(MergeArgs),
     /// Measure how fast this machine evolves pictures
     Bench(BenchArgs),
 }

@@ -18,6 +18,7 @@ mod interrupt;
 mod job;
 mod look;
 mod memory;
+mod merge;
 mod options;
 mod outputs;
 mod paper;
@@ -56,6 +57,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
+        cli::Command::Merge(args) => merge::merge(args),
         cli::Command::Bench(args) => bench::bench(args),
     }
 }
