@@ -5,7 +5,7 @@
 //! compression are fixed: the same population gives the same bytes. The format: <https://www.openraster.org>.
 
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read, Write};
+use std::io::{self, BufReader, Cursor, Read, Write};
 use std::path::Path;
 
 use zip::write::SimpleFileOptions;
@@ -188,6 +188,19 @@ pub fn read_metadata(path: &Path) -> Result<Metadata> {
         header.clear();
     }
     Ok(photo::png_metadata(&header))
+}
+
+/// Whether the file at `path` is a whole zip file: every member is there, and has its checksum.
+#[must_use]
+pub fn is_whole(path: &Path) -> bool {
+    let check = || -> io::Result<()> {
+        let mut zip = ZipArchive::new(BufReader::new(File::open(path)?))?;
+        for index in 0..zip.len() {
+            io::copy(&mut zip.by_index(index)?, &mut io::sink())?;
+        }
+        Ok(())
+    };
+    check().is_ok()
 }
 
 #[cfg(test)]

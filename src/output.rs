@@ -3,13 +3,17 @@
 //! The bytes go to a temporary file beside the target, which then takes the target's name. Nothing here knows what the
 //! bytes mean, or whether the user agreed to replace what is there.
 
-use std::fs::{self, File, Metadata};
-use std::io::{self, Write};
+use std::fs::{self, File, Metadata, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf, is_separator};
 
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+
+/// How the names of temporary files begin and end.
+const PREFIX: &str = ".smalti-";
+const SUFFIX: &str = ".partial";
 
 /// Writes `bytes` to `path`, replacing what is there in one step.
 ///
@@ -109,6 +113,51 @@ impl PartialFile {
     }
 }
 
+/// A file of lines that grows line by line, each written whole, by one process or by several.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Journal {
+    /// The journal at `path`, begun if there is none.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if it cannot be written to.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = File::options().read(true).append(true).create(true).open(path);
+        Ok(Self { path: path.to_owned(), file: file.map_err(|error| output_error(path, &error))? })
+    }
+
+    /// Adds a line, which has no end of its own. A line that a killed process left unfinished is ended first.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if the disk is full or the file went away.
+    pub fn append(&mut self, line: &str) -> Result<()> {
+        // Where the file system has no locks, short writes at the end do not mix either.
+        let is_locked = self.file.lock().is_ok();
+        let done = self.append_whole(line);
+        if is_locked {
+            let _ = self.file.unlock();
+        }
+        done.map_err(|error| output_error(&self.path, &error))
+    }
+
+    fn append_whole(&mut self, line: &str) -> io::Result<()> {
+        let mut bytes = format!("{line}\n").into_bytes();
+        if self.file.seek(SeekFrom::End(0))? > 0 {
+            self.file.seek(SeekFrom::End(-1))?;
+            let mut last = [0];
+            self.file.read_exact(&mut last)?;
+            if last != *b"\n" {
+                bytes.insert(0, b'\n');
+            }
+        }
+        self.file.write_all(&bytes)
+    }
+}
+
 /// Whether [`write_atomically`] could write to `path` now, found out without leaving anything behind.
 ///
 /// To be asked before hours of work. It cannot foresee that the disk fills up.
@@ -159,14 +208,53 @@ fn names_a_folder(path: &Path) -> bool {
 fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".smalti-").suffix(".partial");
+    builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         // The umask takes its bits away, as for any file that a program creates.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    loop {
+        let file = builder.tempfile_in(folder)?;
+        // Whoever sweeps may have found it before it was locked, and then it is about to go.
+        let is_ours = match file.as_file().try_lock() {
+            Ok(()) => true,
+            Err(TryLockError::WouldBlock) => false,
+            // Some file systems have no locks; there nothing is swept.
+            Err(TryLockError::Error(_)) => true,
+        };
+        if is_ours && file.path().exists() {
+            return Ok(file);
+        }
+    }
+}
+
+/// Removes the temporary files that processes left in `folder` when they were killed. Those of living processes are locked, and
+/// stay.
+///
+/// # Errors
+/// [`Error::Output`] if the folder cannot be read, or such a file cannot be removed.
+pub fn sweep(folder: &Path) -> Result<()> {
+    let sweep = || -> io::Result<()> {
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            let name = path.file_name().unwrap_or_default().as_encoded_bytes();
+            if !name.starts_with(PREFIX.as_bytes()) || !name.ends_with(SUFFIX.as_bytes()) {
+                continue;
+            }
+            let is_gone = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
+            let file = match File::open(&path) {
+                Err(error) if is_gone(&error) => continue,
+                file => file?,
+            };
+            if file.try_lock().is_ok() {
+                fs::remove_file(&path).or_else(|error| if is_gone(&error) { Ok(()) } else { Err(error) })?;
+            }
+        }
+        Ok(())
+    };
+    sweep().map_err(|error| output_error(folder, &error))
 }
 
 /// Gives a temporary file the name of its target, and the permissions of the file that it replaces.
@@ -203,4 +291,38 @@ fn output_error(path: &Path, error: &io::Error) -> Error {
         _ => format!("cannot be written ({error}); name another file"),
     };
     Error::output(path, reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_follows_one_that_was_never_ended_on_a_line_of_its_own() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("rows.jsonl");
+        let (mut one, mut other) = (Journal::open(&path), Journal::open(&path));
+        for (journal, line) in [(&mut one, "a"), (&mut other, "b")] {
+            journal.as_mut().expect("the folder is ours").append(line).expect("there is room");
+        }
+        fs::write(&path, b"a\nb\n{\"half").expect("the folder is ours");
+        other.expect("the folder is ours").append("c").expect("there is room");
+        assert_eq!(fs::read_to_string(&path).expect("it is there"), "a\nb\n{\"half\nc\n");
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_swept_and_what_a_living_one_writes_is_not() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let left = folder.path().join(".smalti-abc.partial");
+        let other = folder.path().join(".other.partial");
+        for path in [&left, &other] {
+            fs::write(path, b"half").expect("the folder is ours");
+        }
+        let growing = PartialFile::create(&folder.path().join("out.png")).expect("the folder is ours");
+        sweep(folder.path()).expect("the folder is ours");
+        assert!(!left.exists() && other.exists() && growing.growing_path().exists());
+        growing.commit().expect("nothing took it away");
+        assert!(folder.path().join("out.png").exists());
+        assert!(sweep(&folder.path().join("none")).is_err());
+    }
 }

@@ -1,11 +1,13 @@
 //! What was typed: commands and flags with their help. What they mean is decided in `options`.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
+use super::batch::BatchArgs;
 use super::bench::BenchArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
@@ -16,6 +18,7 @@ use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
 use super::{report, values};
+use crate::error::{Error, Result};
 
 /// Evolves pictures into mosaics of thousands of tiles.
 #[derive(Debug, Parser)]
@@ -30,6 +33,9 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub(super) command: Command,
+    /// What was typed, the name of the program first.
+    #[arg(skip)]
+    typed: Vec<OsString>,
 }
 
 impl Cli {
@@ -38,7 +44,8 @@ impl Cli {
     /// # Errors
     /// The exit code to end with: 0 after help or version, 2 after a wrong command line.
     pub fn from_command_line() -> Result<Self, ExitCode> {
-        Self::try_parse().map_err(|error| {
+        let typed: Vec<OsString> = std::env::args_os().collect();
+        Self::try_parse_from(&typed).map(|cli| Self { typed, ..cli }).map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
                 report::error(&one_sentence(&error.to_string(), &command_typed()));
             } else {
@@ -47,6 +54,34 @@ impl Cli {
             }
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         })
+    }
+
+    /// The flags that decide a picture, if `flags` were typed, too; each of them goes before what was typed.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if one of them decides no picture, or is wrong.
+    pub(super) fn picture_with(&self, flags: &[String]) -> Result<PictureArgs> {
+        let known = PictureArgs::augment_args(clap::Command::new("picture"));
+        let is_known = |name: &str| known.get_arguments().any(|argument| argument.get_long() == Some(name));
+        for flag in flags {
+            let name = flag.trim_start_matches("--").split('=').next().unwrap_or_default();
+            if !is_known(name) {
+                return Err(Error::Usage(format!(
+                    "params: {name} is no flag that decides a picture; see smalti evolve --help"
+                )));
+            }
+        }
+        let end = self.typed.iter().position(|token| token == "--").unwrap_or(self.typed.len());
+        let (before, after) = self.typed.split_at(end);
+        let tokens = before.iter().cloned().chain(flags.iter().map(OsString::from)).chain(after.iter().cloned());
+        // Given twice, the last one counts.
+        let command = Self::command().mut_subcommand("batch", |batch| batch.args_override_self(true));
+        let wrong = |error: clap::Error| Error::Usage(one_sentence(&error.to_string(), "smalti batch"));
+        let matches = command.try_get_matches_from(tokens).map_err(wrong)?;
+        match Self::from_arg_matches(&matches).map_err(wrong)?.command {
+            Command::Batch(args) => Ok(args.picture),
+            _ => Err(Error::Internal("a batch was typed as another command".to_owned())),
+        }
     }
 }
 
@@ -76,6 +111,10 @@ pub(super) enum Command {
     ///
     /// Thousands of coloured tiles are bred, child by child, until together they look like the picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Evolve many pictures, and go on where it was interrupted
+    ///
+    /// One bad picture never stops the others: the reason is in its line of the results, and the exit code is 3.
+    Batch(Box<BatchArgs>),
     /// Draw a population again, at any size, or write it in another format
     ///
     /// At the size at which it evolved the picture is the one that `evolve` wrote.

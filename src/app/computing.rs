@@ -22,6 +22,34 @@ pub(super) struct ComputingArgs {
     pub threads: Option<u64>,
 }
 
+/// The flag of commands that can use several devices.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Computing")]
+pub(super) struct DevicesArg {
+    /// Several devices instead of one, each with pictures of its own: all (every hardware GPU), or a list with commas of what
+    /// --device takes
+    #[arg(long, value_name = "all|LIST", conflicts_with = "device")]
+    pub devices: Option<String>,
+}
+
+impl DevicesArg {
+    /// Opens the devices: those of the list, or the one of `--device`.
+    ///
+    /// # Errors
+    /// [`Error::NoSuitableDevice`] if one of them is not there, or for `all` none; [`Error::Usage`] if the list is empty.
+    pub(super) fn select(&self, computing: &Computing) -> Result<Vec<Selected>> {
+        let Some(list) = &self.devices else { return Ok(vec![computing.select()?]) };
+        if list.trim() == "all" {
+            return device::select_all(computing.validation);
+        }
+        let names: Vec<&str> = list.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
+        if names.is_empty() {
+            return Err(Error::Usage("--devices: expected all, or devices with commas, such as 0,1".to_owned()));
+        }
+        names.into_iter().map(|name| device::select(&request(name)?, computing.validation)).collect()
+    }
+}
+
 /// What was asked for, checked.
 #[derive(Clone, Debug)]
 pub(super) struct Computing {
@@ -69,6 +97,11 @@ impl Computing {
             .num_threads(count)
             .build_global()
             .map_err(|error| Error::Usage(format!("--threads {count}: the threads cannot be started ({error})")))
+    }
+
+    /// CPU threads: as many as were asked for, or as there are.
+    pub(super) fn thread_count(&self) -> usize {
+        self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
     }
 
     /// Finds and opens the device.

@@ -24,7 +24,7 @@ use crate::output;
 const BYTES_MAX: u64 = 1 << 24;
 
 /// A curve, whatever it is of.
-pub(super) trait Tabled {
+pub(super) trait Tabled: Send {
     /// The points as CSV; every row ends with the `status` of the evolution and the first digits of the result's `key`.
     fn csv(&self, status: &str, key: &str) -> String;
 

@@ -9,7 +9,8 @@ use crate::gpu::{GpuEvaluator, VulkanSearch};
 use crate::model::cells::{Course, Search};
 use crate::model::{Evaluator, Fly, Scene};
 use crate::vk::{
-    Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, ValidationLog, choose,
+    Choice, Device, DeviceInfo, DeviceKind, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation,
+    ValidationLog, choose,
 };
 
 /// The device that was chosen, ready for an evaluator.
@@ -83,6 +84,26 @@ pub(super) fn select(request: &DeviceRequest, validation: Validation) -> Result<
     }
     let is_asked_for = *request != DeviceRequest::Auto || validation == Validation::On;
     unless_nobody_asked(find_and_open(request, validation, is_asked_for), is_asked_for)
+}
+
+/// Opens every hardware GPU.
+///
+/// # Errors
+/// [`Error::NoSuitableDevice`] if there is none; [`Error::Vulkan`] if one of them cannot be opened.
+pub(super) fn select_all(validation: Validation) -> Result<Vec<Selected>> {
+    let instance = Instance::create(InstanceOptions { validation })?;
+    let devices = instance.physical_devices()?;
+    let gpus: Vec<&DeviceInfo> = devices.iter().filter(|info| info.kind != DeviceKind::Cpu).collect();
+    if gpus.is_empty() {
+        let why =
+            "--devices all: there is no hardware GPU; see smalti devices, or leave it to --device auto".to_owned();
+        return Err(Error::NoSuitableDevice { why });
+    }
+    let open = |info: &&DeviceInfo| {
+        let device = Device::create(&instance, info, &DeviceOptions::default())?;
+        Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()), is_asked_for: true })
+    };
+    gpus.iter().map(open).collect()
 }
 
 fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: bool) -> Result<Selected> {

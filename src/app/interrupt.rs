@@ -67,6 +67,11 @@ impl Interrupt {
         self.arming.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Ends the work as a signal would.
+    pub(super) fn request(&self) {
+        self.requested.store(true, Ordering::Relaxed);
+    }
+
     /// Whether a signal came; waits for no writer.
     pub(super) fn is_requested(&self) -> bool {
         self.requested.load(Ordering::Relaxed)

@@ -60,6 +60,12 @@ pub(super) fn search_bytes(pixel_count: u64, blend: Blend) -> u64 {
     })
 }
 
+/// The bytes that a batch may take: four fifths of what is free now, or all if that is not known.
+pub(super) fn share_of_free() -> u64 {
+    let free = std::fs::read_to_string("/proc/meminfo").ok().and_then(|told| available_bytes(&told));
+    free.map_or(u64::MAX, |bytes| bytes / 5 * 4)
+}
+
 /// Refuses what needs more memory than there is; passes where that is not known.
 ///
 /// # Errors

@@ -3,6 +3,7 @@
 //! Only this module prints, reads the clock, the environment, or paths given by the user. Failures end as one sentence
 //! on stderr; stdout carries data only.
 
+mod batch;
 mod bench;
 mod cells;
 mod child;
@@ -51,6 +52,7 @@ pub use cli::Cli;
 pub fn run(cli: &Cli) -> ExitCode {
     match &cli.command {
         cli::Command::Evolve(args) => run::evolve(args),
+        cli::Command::Batch(args) => batch::make(args, cli),
         cli::Command::Render(args) => render::render(args),
         cli::Command::Timelapse(args) => timelapse::make(args),
         cli::Command::Devices(args) => devices::list(args),

@@ -97,6 +97,14 @@ impl Progress {
         }
     }
 
+    /// Prints a line above the bar, if there is one.
+    pub(super) fn say(&self, line: &str) {
+        match &self.form {
+            Form::Bar(bar) => bar.suspend(|| report::say(line)),
+            Form::Nothing | Form::Plain | Form::Json => report::say(line),
+        }
+    }
+
     /// Takes the bar away; what comes next begins on a clean line.
     pub(super) fn finish(&self) {
         if let Form::Bar(bar) = &self.form {

@@ -240,6 +240,17 @@ pub(super) struct Story {
 }
 
 impl Story {
+    /// What metadata of smalti's tells.
+    pub(super) fn told(told: &Map<String, Value>) -> Option<Self> {
+        let text = |key| told.get(key).and_then(Value::as_str);
+        let key = text("key")?.to_owned();
+        // An unknown word is a result that somebody may want to keep.
+        let is_complete = text("status") != Some("partial");
+        let lowered = told.get("objective").or(told.get("sae")).and_then(Value::as_i64);
+        let restarts_made = told.get("restarts_made").and_then(Value::as_u64);
+        Some(Self { key, is_complete, lowered, restarts_made })
+    }
+
     /// Whether the file is of what has this key.
     pub(super) fn is_of(&self, key: &str) -> bool {
         self.key.len() >= archive::KEY_DIGITS && key.starts_with(&self.key)
@@ -261,6 +272,11 @@ impl Story {
 
 /// The story of the file at a destination, if smalti wrote it.
 pub(super) fn story_of_file(destination: &Destination) -> Option<Story> {
+    told_by_file(destination).and_then(|told| Story::told(&told))
+}
+
+/// The metadata of the file at a destination, if smalti wrote it.
+pub(super) fn told_by_file(destination: &Destination) -> Option<Map<String, Value>> {
     let path = &destination.path;
     let told = match destination.content {
         Content::Population => archive::read_meta(path).ok()?,
@@ -270,14 +286,8 @@ pub(super) fn story_of_file(destination: &Destination) -> Option<Story> {
         Content::Svg => vector::read_meta(path).ok()??,
         Content::Csv => archive::read_csv_meta(path).ok()??,
     };
-    let text = |key| told.get(key).and_then(Value::as_str);
-    let is_ours = destination.content == Content::Csv || text("software") == Some(SOFTWARE);
-    let key = text("key").filter(|_| is_ours)?.to_owned();
-    let number = |key| told.get(key).and_then(Value::as_u64);
-    // An unknown word is a result that somebody may want to keep.
-    let is_complete = text("status") != Some("partial");
-    let lowered = told.get("objective").or(told.get("sae")).and_then(Value::as_i64);
-    Some(Story { key, is_complete, lowered, restarts_made: number("restarts_made") })
+    let is_ours = destination.content == Content::Csv || told.get("software").and_then(Value::as_str) == Some(SOFTWARE);
+    is_ours.then_some(told)
 }
 
 fn picture_description(metadata: Result<Metadata>) -> Result<Option<Map<String, Value>>> {

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use indicatif::{BinaryBytes, HumanCount};
 use serde::Serialize;
+use serde_json::{Map, Value};
 
 use super::device::Selected;
 use super::interrupt::EXIT_INTERRUPTED;
@@ -30,6 +31,10 @@ pub(super) enum Status {
     Partial,
     /// Not evolved: only a dry run.
     Planned,
+    /// Not evolved: all outputs were there, whole, from the same picture and options.
+    Unchanged,
+    /// Not evolved: there were outputs, and nobody asked how they came to be.
+    Skipped,
     /// Not all outputs were written.
     Failed,
 }
@@ -37,11 +42,14 @@ pub(super) enum Status {
 /// The result of one picture; the same fields for one picture and in a batch.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Row {
-    /// The input's file name without its ending.
+    /// The input's file name without its ending; in a batch, what its manifest says, or the path below the folder that was
+    /// named.
     pub id: String,
+    /// The picture, as it was named.
+    pub input: String,
     pub status: Status,
     /// Why the evolution ended.
-    pub stop: Option<&'static str>,
+    pub stop: Option<String>,
     /// The files that were written, or would be.
     pub output: Vec<String>,
     /// SHA-256 over all that decides the result.
@@ -86,6 +94,7 @@ impl Row {
     pub(super) fn new(input: &Path, seed: u64, scheme: SchemeName) -> Self {
         Self {
             id: input.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            input: input.display().to_string(),
             status: Status::Failed,
             stop: None,
             output: Vec::new(),
@@ -118,7 +127,7 @@ impl Row {
     /// Takes in how an evolution ended.
     pub(super) fn note_evolution(&mut self, evolution: &Evolution) {
         let outcome = evolution.outcome();
-        self.stop = evolution.stop_reason().map(crate::evolve::StopReason::word);
+        self.stop = evolution.stop_reason().map(|reason| reason.word().to_owned());
         self.sae = evolution.best_sae();
         self.objective = self.sae.and_then(|sae| i64::try_from(sae).ok());
         self.living = Some(evolution.best_flies().iter().filter(|fly| fly.alive).count());
@@ -132,13 +141,26 @@ impl Row {
 
     /// Takes in how a search ended.
     pub(super) fn note_search(&mut self, ending: &Ending, standing: &Standing, flies: &[Fly]) {
-        self.stop = Some(ending.stop.word());
+        self.stop = Some(ending.stop.word().to_owned());
         self.sae = Some(ending.sae);
         self.objective = Some(standing.objective);
         self.living = Some(flies.iter().filter(|fly| fly.alive).count());
         self.births = standing.births;
         self.births_in_last_run = standing.births;
         self.evals = standing.evals;
+    }
+
+    /// Takes in how the evolution ended that a file tells of.
+    pub(super) fn note_story(&mut self, told: &Map<String, Value>) {
+        let number = |key: &str| told.get(key).and_then(Value::as_u64);
+        self.stop = told.get("stop").and_then(Value::as_str).map(str::to_owned);
+        self.sae = number("sae");
+        self.objective = told.get("objective").or(told.get("sae")).and_then(Value::as_i64);
+        self.births = number("births").unwrap_or_default();
+        self.births_in_last_run = number("births_in_last_run").unwrap_or(self.births);
+        self.evals = number("evals").unwrap_or(self.births);
+        self.fallback_kills = number("fallback_kills").unwrap_or_default();
+        self.restarts = number("restarts_made").unwrap_or_default() as u32;
     }
 
     /// Takes in why there is no result, or not all of it.
@@ -205,7 +227,7 @@ pub(super) fn print_summary(row: &Row, options: &EvolveOptions, job: &Job) {
         Some(_) => " before the last change of masks".to_owned(),
         None => String::new(),
     };
-    say(&format!("seed {}, stopped by {}{warming_up}", row.seed, row.stop.unwrap_or_default()));
+    say(&format!("seed {}, stopped by {}{warming_up}", row.seed, row.stop.as_deref().unwrap_or_default()));
     if options.verbosity == Verbosity::Verbose {
         say(&format!("read in {:.0} ms, encoded and written in {:.0} ms", row.load_ms, row.save_ms));
         say(&format!("SHA-256 of the input {}", job.input_sha256));

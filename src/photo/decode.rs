@@ -95,6 +95,9 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
     Ok(Loaded { photo, transparent, original_width_px, original_height_px, sha256, warnings })
 }
 
+/// The last chunk of every PNG, with its checksum.
+const PNG_END: [u8; 12] = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xAE, 0x42, 0x60, 0x82];
+
 /// Whether the file at `path` begins like a picture that can be read.
 ///
 /// # Errors
@@ -105,6 +108,22 @@ pub(super) fn is_picture(path: &Path) -> Result<bool> {
         .and_then(|file| file.take(SIGNATURE_BYTES).read_to_end(&mut signature))
         .map_err(|error| Error::input(path, why_unreadable(&error)))?;
     Ok(known_format(&signature).is_some())
+}
+
+/// Whether the file at `path` is a whole PNG, JPEG or WebP: its pixels can be decoded, and nothing is missing after them.
+#[must_use]
+pub fn is_whole(path: &Path) -> bool {
+    let Ok((format, bytes)) = read_picture_file(path) else { return false };
+    let has_its_end = match format {
+        ImageFormat::Png => bytes.ends_with(&PNG_END),
+        ImageFormat::Jpeg => jpeg_segments::is_complete(&bytes),
+        ImageFormat::WebP => {
+            let size = bytes.get(4..8).and_then(|size| size.try_into().ok()).map(u32::from_le_bytes);
+            size.is_some_and(|size| u64::from(size) + 8 == bytes.len() as u64)
+        }
+        _ => false,
+    };
+    has_its_end && decode_raw(&bytes, format).is_ok()
 }
 
 /// The bytes of the file at `path`, once its first bytes have shown that it is a picture.

@@ -20,7 +20,7 @@ pub(crate) mod xml;
 
 pub use animation::{ApngEncoder, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
 pub(crate) use decode::why_unreadable;
-pub use decode::{Background, Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, read};
+pub use decode::{Background, Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, is_whole, read};
 pub use encode::{Format, encode, encode_jpeg, encode_png, encode_png_with_alpha, encode_webp, encode_with_alpha};
 pub(crate) use metadata::png_metadata;
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};

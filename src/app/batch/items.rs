@@ -1,0 +1,214 @@
+//! The pictures of a batch, each with its options and the places of its outputs; all found and checked before the first is
+//! read.
+
+use std::collections::{HashMap, HashSet};
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use super::inputs::Found;
+use super::manifest::ManifestRow;
+use super::name::{Known, NameTemplate};
+use crate::app::destination::{Destination, place_of};
+use crate::app::options::{EvolveOptions, SchemeOptions};
+use crate::app::picture::SchemeName;
+use crate::error::{Error, Result};
+
+/// One picture of a batch.
+#[derive(Clone, Debug)]
+pub(super) struct Item {
+    /// Unlike that of all others.
+    pub id: String,
+    pub input: PathBuf,
+    pub outputs: Vec<Destination>,
+    pub group: Option<String>,
+    /// The id of a picture that must be there first.
+    pub after: Option<String>,
+    /// What it has in common with others.
+    common: Arc<EvolveOptions>,
+}
+
+impl Item {
+    /// What `smalti evolve` would call the options of this picture.
+    pub(super) fn options(&self) -> EvolveOptions {
+        EvolveOptions { input: self.input.clone(), outputs: self.outputs.clone(), ..(*self.common).clone() }
+    }
+
+    /// How it evolves.
+    pub(super) fn scheme(&self) -> SchemeName {
+        match self.common.scheme {
+            SchemeOptions::Cells(_) => SchemeName::Cells,
+            SchemeOptions::Paper(_) => SchemeName::Paper,
+        }
+    }
+
+    /// The seed of its random numbers.
+    pub(super) fn seed(&self) -> u64 {
+        seed_of(&self.common)
+    }
+}
+
+/// The number that decides every random choice of an evolution with these options.
+fn seed_of(options: &EvolveOptions) -> u64 {
+    match &options.scheme {
+        SchemeOptions::Cells(cells) => cells.seed,
+        SchemeOptions::Paper(scheme) => scheme.seed,
+    }
+}
+
+/// Where outputs go, and in which formats.
+pub(super) struct Naming<'a> {
+    pub folder: &'a Path,
+    pub template: &'a NameTemplate,
+    /// Endings, each of another format.
+    pub formats: &'a [String],
+}
+
+/// A picture before it has an id of its own and outputs.
+struct Draft {
+    row: ManifestRow,
+    relative: PathBuf,
+    common: Arc<EvolveOptions>,
+}
+
+/// The items of a batch: the files that were found, then the rows of the manifest. `options_with` gives the options that flags
+/// of a row ask for besides those of the command line.
+///
+/// # Errors
+/// [`Error::Usage`] or [`Error::Input`] that names the row, or the two pictures that would be written to the same place.
+pub(super) fn gather(
+    found: Vec<Found>,
+    (manifest, rows): (&Path, Vec<(usize, ManifestRow)>),
+    options_with: &dyn Fn(&[String]) -> Result<EvolveOptions>,
+    naming: &Naming<'_>,
+) -> Result<Vec<Item>> {
+    let common = Arc::new(options_with(&[])?);
+    let of_found = |Found { path, relative }| {
+        let row = ManifestRow { input: path, ..ManifestRow::default() };
+        Draft { row, relative, common: Arc::clone(&common) }
+    };
+    let mut drafts: Vec<Draft> = found.into_iter().map(of_found).collect();
+    let mut known: HashMap<Vec<String>, Arc<EvolveOptions>> = HashMap::from([(Vec::new(), common.clone())]);
+    for (line, row) in rows {
+        let refuse = |reason: String| Error::input(manifest, format!("line {line}: {reason}"));
+        let flags = row.flags().map_err(refuse)?;
+        let common = match known.get(&flags) {
+            Some(common) => Arc::clone(common),
+            None => {
+                let common = Arc::new(options_with(&flags).map_err(|error| refuse(error.to_string()))?);
+                known.insert(flags, Arc::clone(&common));
+                common
+            }
+        };
+        let relative = relative_of(&row.input);
+        drafts.push(Draft { row, relative, common });
+    }
+    let ids = ids(&drafts)?;
+    let finish = |(index, (draft, id)): (usize, (Draft, String))| finish(draft, id, index, naming);
+    let items = drafts.into_iter().zip(ids).enumerate().map(finish).collect::<Result<Vec<Item>>>()?;
+    check_places(&items)?;
+    check_order(&items)?;
+    Ok(items)
+}
+
+/// A manifest's input below the current folder, or its name alone.
+fn relative_of(input: &Path) -> PathBuf {
+    let is_below = input.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    let name = || input.file_name().map_or_else(|| input.to_owned(), PathBuf::from);
+    if is_below { input.components().filter(|part| *part != Component::CurDir).collect() } else { name() }
+}
+
+/// The ids: as in the manifest, or else the path below the folder that was named, without its ending where that is still unlike
+/// all others.
+fn ids(drafts: &[Draft]) -> Result<Vec<String>> {
+    let short = |draft: &Draft| draft.relative.with_extension("").to_string_lossy().into_owned();
+    let given = |draft: &Draft| draft.row.id.clone();
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    for draft in drafts {
+        *counts.entry(given(draft).unwrap_or_else(|| short(draft))).or_default() += 1;
+    }
+    let mut taken = HashSet::new();
+    let id = |draft: &Draft| {
+        let id = given(draft).unwrap_or_else(|| match short(draft) {
+            id if counts.get(&id) == Some(&1) => id,
+            _ => draft.row.input.to_string_lossy().into_owned(),
+        });
+        if taken.insert(id.clone()) {
+            Ok(id)
+        } else {
+            Err(Error::Usage(format!("two pictures have the id {id}; give each row of the manifest an id of its own")))
+        }
+    };
+    drafts.iter().map(id).collect()
+}
+
+fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result<Item> {
+    let Draft { row, relative, common } = draft;
+    let paths = match &row.output {
+        Some(outputs) => outputs.paths().to_vec(),
+        None => {
+            let known =
+                Known { relative: &relative, id: &id, group: row.group.as_deref(), index, seed: seed_of(&common) };
+            naming.formats.iter().map(|format| naming.template.path(&known, format)).collect()
+        }
+    };
+    let destination = |path: &PathBuf| {
+        let destination = Destination::for_result(&naming.folder.join(path))?;
+        if path == Path::new("-") {
+            return Err(Error::Usage(format!("{id}: a batch writes files; name one instead of -")));
+        }
+        Ok(destination)
+    };
+    let outputs: Vec<Destination> = paths.iter().map(destination).collect::<Result<_>>()?;
+    if outputs.is_empty() {
+        return Err(Error::Usage(format!("{id}: has no output; name one")));
+    }
+    Ok(Item { id, input: row.input, outputs, group: row.group, after: row.after, common })
+}
+
+/// Refuses outputs in the place of an input or of one another.
+fn check_places(items: &[Item]) -> Result<()> {
+    let inputs: HashMap<PathBuf, &Item> = items.iter().map(|item| (place_of(&item.input), item)).collect();
+    let mut written: HashMap<PathBuf, &Item> = HashMap::new();
+    for item in items {
+        for output in &item.outputs {
+            let (place, path) = (place_of(&output.path), output.path.display());
+            if inputs.contains_key(&place) {
+                return Err(Error::Usage(format!("{path} is an input; name another folder for the outputs")));
+            }
+            if let Some(other) = written.insert(place, item) {
+                return Err(Error::Usage(format!(
+                    "{} and {} would both be written to {path}; tell them apart with --name, as in \
+                     '{{dir}}/{{stem}}-{{suffix}}.{{ext}}'",
+                    other.input.display(),
+                    item.input.display()
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses an order that cannot be kept: after a picture that is not of the same group, or after itself.
+fn check_order(items: &[Item]) -> Result<()> {
+    let by_id: HashMap<&str, &Item> = items.iter().map(|item| (item.id.as_str(), item)).collect();
+    for item in items {
+        let mut at = item;
+        for _ in 0..=items.len() {
+            let Some(after) = &at.after else { break };
+            let Some(first) = by_id.get(after.as_str()) else {
+                return Err(Error::Usage(format!("{}: comes after {after}, which is not in the batch", at.id)));
+            };
+            if first.group != at.group || at.group.is_none() {
+                return Err(Error::Usage(format!(
+                    "{}: comes after {after}, which another shard may have; give both the same group",
+                    at.id
+                )));
+            }
+            if first.id == item.id {
+                return Err(Error::Usage(format!("{}: comes after itself; break the circle of after", item.id)));
+            }
+            at = first;
+        }
+    }
+    Ok(())
+}

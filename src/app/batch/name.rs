@@ -1,0 +1,125 @@
+//! `--name`: what the outputs of a batch are called.
+
+use std::path::{Path, PathBuf};
+
+/// What a placeholder stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// The input's name without its ending.
+    Stem,
+    /// The input's ending.
+    Suffix,
+    /// The input's folder below the one that was named.
+    Dir,
+    /// The id of the picture.
+    Id,
+    /// Its group, or nothing.
+    Group,
+    /// Its number in the batch, from 1.
+    Index,
+    Seed,
+    /// The ending of the output's format.
+    Ext,
+}
+
+const PARTS: [(&str, Part); 8] = [
+    ("stem", Part::Stem),
+    ("suffix", Part::Suffix),
+    ("dir", Part::Dir),
+    ("id", Part::Id),
+    ("group", Part::Group),
+    ("index", Part::Index),
+    ("seed", Part::Seed),
+    ("ext", Part::Ext),
+];
+
+/// A name with placeholders.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::app) struct NameTemplate {
+    pieces: Vec<Piece>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Piece {
+    Text(String),
+    Part(Part),
+}
+
+/// What is known of a picture when its outputs are named.
+pub(super) struct Known<'a> {
+    /// Below the folder that was named.
+    pub relative: &'a Path,
+    pub id: &'a str,
+    pub group: Option<&'a str>,
+    /// From 0.
+    pub index: usize,
+    pub seed: u64,
+}
+
+/// A name such as `{dir}/{stem}-{seed}.{ext}`.
+pub(in crate::app) fn parse(text: &str) -> Result<NameTemplate, String> {
+    let all = || PARTS.map(|(name, _)| format!("{{{name}}}")).join(" ");
+    let mut pieces = Vec::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('{') {
+        pieces.push(Piece::Text(before.to_owned()));
+        let (name, after) = after.split_once('}').ok_or_else(|| format!("a {{ without its }}; there are {}", all()))?;
+        let part = PARTS.iter().find(|(known, _)| *known == name);
+        let (_, part) = part.ok_or_else(|| format!("no placeholder is called {{{name}}}; there are {}", all()))?;
+        pieces.push(Piece::Part(*part));
+        rest = after;
+    }
+    pieces.push(Piece::Text(rest.to_owned()));
+    pieces.retain(|piece| *piece != Piece::Text(String::new()));
+    let ends_in_format = pieces.last() == Some(&Piece::Part(Part::Ext));
+    if !ends_in_format || !matches!(pieces.iter().rev().nth(1), Some(Piece::Text(text)) if text.ends_with('.')) {
+        return Err("expected a name that ends in .{ext}, such as {stem}.{ext}".to_owned());
+    }
+    Ok(NameTemplate { pieces })
+}
+
+impl NameTemplate {
+    /// The name of the output in the format that `ext` is the ending of, relative to the output folder.
+    pub(super) fn path(&self, known: &Known<'_>, ext: &str) -> PathBuf {
+        let text = |path: Option<&std::ffi::OsStr>| path.unwrap_or_default().to_string_lossy().into_owned();
+        let spelt = self.pieces.iter().map(|piece| match piece {
+            Piece::Text(text) => text.clone(),
+            Piece::Part(Part::Stem) => text(known.relative.file_stem()),
+            Piece::Part(Part::Suffix) => text(known.relative.extension()),
+            Piece::Part(Part::Dir) => {
+                let folder = known.relative.parent().unwrap_or(Path::new("")).to_string_lossy();
+                if folder.is_empty() { ".".to_owned() } else { folder.into_owned() }
+            }
+            Piece::Part(Part::Id) => known.id.to_owned(),
+            Piece::Part(Part::Group) => known.group.unwrap_or_default().to_owned(),
+            Piece::Part(Part::Index) => (known.index + 1).to_string(),
+            Piece::Part(Part::Seed) => known.seed.to_string(),
+            Piece::Part(Part::Ext) => ext.to_owned(),
+        });
+        // Components drop the dots of a folder that is none.
+        Path::new(&spelt.collect::<String>()).components().filter(|part| part.as_os_str() != ".").collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn placeholders_are_filled_in() {
+        let known = Known { relative: Path::new("trip/p 1.JPG"), id: "trip/p 1", group: Some("g"), index: 4, seed: 9 };
+        let name = |text: &str| parse(text).expect("it is a name").path(&known, "svg").display().to_string();
+        assert_eq!(name("{dir}/{stem}.{ext}"), "trip/p 1.svg");
+        assert_eq!(name("{group}/{index}-{stem}-{suffix}-{seed}.{ext}"), "g/5-p 1-JPG-9.svg");
+        assert_eq!(name("{id}.{ext}"), "trip/p 1.svg");
+        let flat = Known { relative: Path::new("a.png"), id: "a", group: None, index: 0, seed: 0 };
+        assert_eq!(parse("{dir}/{stem}.{ext}").expect("it is a name").path(&flat, "png"), Path::new("a.png"));
+    }
+
+    #[test]
+    fn a_name_must_end_in_its_format_and_know_its_placeholders() {
+        for text in ["{stem}", "{stem}.png", "{stem}{ext}", "{name}.{ext}", "{stem.{ext}", ""] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
+}
