@@ -14,6 +14,7 @@ use super::gallery::GalleryArgs;
 use super::merge::MergeArgs;
 use super::paper::PaperArgs;
 use super::picture::PictureArgs;
+use super::plan::PlanArgs;
 use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
@@ -35,7 +36,7 @@ pub struct Cli {
     pub(super) command: Command,
     /// What was typed, the name of the program first.
     #[arg(skip)]
-    typed: Vec<OsString>,
+    pub(super) typed: Vec<OsString>,
 }
 
 impl Cli {
@@ -75,11 +76,14 @@ impl Cli {
         let (before, after) = self.typed.split_at(end);
         let tokens = before.iter().cloned().chain(flags.iter().map(OsString::from)).chain(after.iter().cloned());
         // Given twice, the last one counts.
-        let command = Self::command().mut_subcommand("batch", |batch| batch.args_override_self(true));
+        let command = ["batch", "plan"]
+            .into_iter()
+            .fold(Self::command(), |cli, name| cli.mut_subcommand(name, |command| command.args_override_self(true)));
         let wrong = |error: clap::Error| Error::Usage(one_sentence(&error.to_string(), "smalti batch"));
         let matches = command.try_get_matches_from(tokens).map_err(wrong)?;
         match Self::from_arg_matches(&matches).map_err(wrong)?.command {
             Command::Batch(args) => Ok(args.picture),
+            Command::Plan(args) => Ok(args.batch.picture),
             _ => Err(Error::Internal("a batch was typed as another command".to_owned())),
         }
     }
@@ -136,6 +140,8 @@ pub(super) enum Command {
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed with
     /// numpy, scipy and scikit-image. Of an animation the first frame is measured.
     Score(ScoreArgs),
+    /// Cut a batch into shards, with scripts that run them on Slurm, Kubernetes, or GNU parallel
+    Plan(Box<PlanArgs>),
     /// Put the results of several shards or runs together
     ///
     /// Tells which pictures failed, and which are missing.

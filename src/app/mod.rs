@@ -24,6 +24,7 @@ mod options;
 mod outputs;
 mod paper;
 mod picture;
+mod plan;
 mod prepared;
 mod presets;
 mod progress;
@@ -59,6 +60,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
+        cli::Command::Plan(args) => plan::plan(args, cli),
         cli::Command::Merge(args) => merge::merge(args),
         cli::Command::Bench(args) => bench::bench(args),
     }

@@ -23,6 +23,7 @@ use self::existing::OnExists;
 use self::gate::Gate;
 use self::inputs::Depth;
 use self::items::{Item, Naming};
+pub(super) use self::manifest::ManifestRow;
 use self::name::NameTemplate;
 use self::pipeline::{Pipeline, Told};
 use self::schedule::Schedule;
@@ -223,6 +224,31 @@ fn check_formats(formats: &[String]) -> Result<Vec<String>> {
         return Err(Error::Usage(format!("--format: {twice} is named twice")));
     }
     Ok(formats)
+}
+
+/// A picture of a batch, for plans.
+pub(super) struct Planned {
+    /// All that a manifest must say of it.
+    pub row: ManifestRow,
+    pub options: EvolveOptions,
+}
+
+/// The pictures that a batch would evolve.
+///
+/// # Errors
+/// As those of the batch, before it begins.
+pub(super) fn planned(args: &BatchArgs, cli: &Cli) -> Result<Vec<Planned>> {
+    let items = find(args, cli)?;
+    Ok(items.into_iter().map(|item| Planned { options: item.options(), row: item.row }).collect())
+}
+
+/// The ids of the pictures of a manifest, in its order.
+///
+/// # Errors
+/// As [`manifest::read`].
+pub(super) fn ids(path: &Path) -> Result<Vec<String>> {
+    let rows: Vec<ManifestRow> = manifest::read(path)?.into_iter().map(|(_, row)| row).collect();
+    items::ids_of_rows(&rows)
 }
 
 /// Makes the output folder, takes away what killed processes left in it, and opens the file of the results.

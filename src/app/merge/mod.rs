@@ -12,8 +12,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use self::rows::{ResultRow, Rows};
-use super::destination;
-use super::report;
+use super::{batch, destination, report};
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -184,19 +183,7 @@ fn holds_rows(path: &Path) -> bool {
 fn expected_ids(manifests: &[PathBuf]) -> Result<Vec<String>> {
     let mut ids = Vec::new();
     for path in manifests {
-        let text = fs::read_to_string(path).map_err(|error| Error::input(path, format!("cannot be read ({error})")))?;
-        for line in text.lines().filter(|line| !line.trim().is_empty()) {
-            let item: Item = serde_json::from_str(line).map_err(|error| {
-                Error::input(path, format!("is no manifest ({error}); give one that smalti batch takes"))
-            })?;
-            ids.push(item.id.unwrap_or(item.input));
-        }
+        ids.extend(batch::ids(path)?);
     }
     Ok(ids)
-}
-
-#[derive(serde::Deserialize)]
-struct Item {
-    id: Option<String>,
-    input: String,
 }

@@ -8,8 +8,9 @@ use super::rows::ResultRow;
 use crate::error::{Error, Result};
 
 /// The fields of a row, in its order.
-const COLUMNS: [&str; 26] = [
+const COLUMNS: [&str; 27] = [
     "id",
+    "input",
     "status",
     "stop",
     "output",
@@ -147,7 +148,7 @@ mod tests {
         let csv = String::from_utf8(csv(&[row(line, "r.jsonl")]).expect("rows are CSV")).expect("and text");
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], COLUMNS.join(","));
-        assert_eq!(lines[1], r#""a, b",complete,,x.png;x.npz,,,,,,34.5,,,,,,,,,,,,,,,,"no ""x""""#);
+        assert_eq!(lines[1], r#""a, b",,complete,,x.png;x.npz,,,,,,34.5,,,,,,,,,,,,,,,,"no ""x""""#);
     }
 
     #[test]
