@@ -93,6 +93,7 @@ start_cluster() {
 }
 
 show_logs() {
+    [[ -d "$1/log" ]] || return 0
     tail -n 25 "$1"/log/* >&2 || true
 }
 

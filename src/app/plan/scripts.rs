@@ -88,17 +88,18 @@ shard=$(printf '%0{digits}d' "$index")
 "${{SMALTI:-smalti}}" {arguments} \
     ${{SLURM_CPUS_PER_TASK:+--threads "$SLURM_CPUS_PER_TASK"}} &
 pid=$!
-asked=no
-trap 'asked=USR1; kill -USR1 "$pid" 2>/dev/null' USR1
+cancelled=no
+trap 'trapped=yes; kill -USR1 "$pid" 2>/dev/null' USR1
 # A task that is cancelled must not come back, and one that Slurm itself requeues comes back without help.
-trap 'asked=TERM; kill -TERM "$pid" 2>/dev/null' TERM INT
+trap 'trapped=yes; cancelled=yes; kill -TERM "$pid" 2>/dev/null' TERM INT
 while :; do
+    trapped=no
     wait "$pid"
     code=$?
-    # A trap ends the wait, not the process.
-    kill -0 "$pid" 2>/dev/null || break
+    # A trap ends the wait, not the process, whose code the next wait gives.
+    [ "$trapped" = yes ] && [ "$code" -gt 128 ] || break
 done
-if [ "$code" -eq 75 ] && [ "$asked" != TERM ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt "${{RESTARTS_MAX:-20}}" ]; then
+if [ "$code" -eq 75 ] && [ "$cancelled" = no ] && [ "${{SLURM_RESTART_COUNT:-0}}" -lt "${{RESTARTS_MAX:-20}}" ]; then
     scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
 fi
 exit "$code"
@@ -185,7 +186,7 @@ spec:
         );
         let (count, digits) = (self.shard_count, self.digits());
         let (work_folder, folder) = (quoted(&self.work_folder), quoted(&self.folder));
-        let arguments = self.arguments("    ");
+        let arguments = self.arguments("        ");
         format!(
             r#"#!/bin/sh
 {heading}
