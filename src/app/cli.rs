@@ -11,6 +11,7 @@ use super::batch::BatchArgs;
 use super::bench::BenchArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
+use super::manual::{CompletionsArgs, ManArgs};
 use super::merge::MergeArgs;
 use super::paper::PaperArgs;
 use super::picture::PictureArgs;
@@ -18,7 +19,7 @@ use super::plan::PlanArgs;
 use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
-use super::{report, values};
+use super::{config, report, values};
 use crate::error::{Error, Result};
 
 /// Evolves pictures into mosaics of thousands of tiles.
@@ -34,7 +35,10 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub(super) command: Command,
-    /// What was typed, the name of the program first.
+    /// Flags in a TOML file; those that are typed go before it
+    #[arg(long, global = true, value_name = "FILE", env = "SMALTI_CONFIG", help_heading = "Options")]
+    config: Option<PathBuf>,
+    /// What was typed, the name of the program first, and what the file of `--config` added to it.
     #[arg(skip)]
     pub(super) typed: Vec<OsString>,
 }
@@ -45,7 +49,12 @@ impl Cli {
     /// # Errors
     /// The exit code to end with: 0 after help or version, 2 after a wrong command line.
     pub fn from_command_line() -> Result<Self, ExitCode> {
-        let typed: Vec<OsString> = std::env::args_os().collect();
+        let mut definition = Self::command();
+        definition.build();
+        let typed = config::expand(std::env::args_os().collect(), &definition).map_err(|error| {
+            report::error(&error.to_string());
+            ExitCode::from(error.exit_code())
+        })?;
         Self::try_parse_from(&typed).map(|cli| Self { typed, ..cli }).map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
                 report::error(&one_sentence(&error.to_string(), &command_typed()));
@@ -148,6 +157,10 @@ pub(super) enum Command {
     Merge(MergeArgs),
     /// Measure how fast this machine evolves pictures
     Bench(BenchArgs),
+    /// Print what a shell needs to complete commands and flags
+    Completions(CompletionsArgs),
+    /// Print a manual page, or write all of them
+    Man(ManArgs),
 }
 
 const EVOLVE_EXAMPLES: &str = "\
@@ -212,7 +225,7 @@ pub(super) struct EvolveArgs {
 #[command(next_help_heading = "Messages")]
 pub(super) struct MessageArgs {
     /// How to show progress on stderr; a bar needs a terminal, elsewhere it becomes plain lines
-    #[arg(long, value_enum, value_name = "KIND", default_value = "auto")]
+    #[arg(long, value_enum, value_name = "KIND", env = "SMALTI_PROGRESS", default_value = "auto")]
     pub progress: ProgressKind,
     /// Say more
     #[arg(short, long, conflicts_with = "quiet")]

@@ -18,7 +18,7 @@ pub(super) struct ComputingArgs {
     #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
     pub device: String,
     /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", value_parser = values::count)]
+    #[arg(long, value_name = "T", env = "SMALTI_THREADS", value_parser = values::count)]
     pub threads: Option<u64>,
 }
 

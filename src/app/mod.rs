@@ -9,6 +9,7 @@ mod cells;
 mod child;
 mod cli;
 mod computing;
+mod config;
 mod curve;
 mod curve_file;
 mod destination;
@@ -18,6 +19,7 @@ mod gallery;
 mod interrupt;
 mod job;
 mod look;
+mod manual;
 mod memory;
 mod merge;
 mod options;
@@ -63,5 +65,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Plan(args) => plan::plan(args, cli),
         cli::Command::Merge(args) => merge::merge(args),
         cli::Command::Bench(args) => bench::bench(args),
+        cli::Command::Completions(args) => manual::completions(args),
+        cli::Command::Man(args) => manual::man(args),
     }
 }

@@ -25,7 +25,9 @@ const SHARD_MIN_S: f64 = 60.0;
 /// Numbers of tasks that Slurm allows unless its MaxArraySize says otherwise.
 const SLURM_ARRAY_MAX: u32 = 1_000;
 /// Flags whose meaning is in the shard manifests, or that the scripts give themselves.
-const KEPT_FLAGS: [&str; 14] = [
+const KEPT_FLAGS: [&str; 15] = [
+    // Its flags were typed in its place.
+    "config",
     "manifest",
     "recursive",
     "shard",

@@ -1,0 +1,171 @@
+//! `--config`: flags in a TOML file, for those who type the same ones again and again.
+//!
+//! A key is the name of a flag, without its minuses. Those at the top go to every command that has such a flag, those of a table to
+//! the command with its name. What is typed goes before what the environment says, and that before the file.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::parser::ValueSource;
+use clap::{Arg, ArgMatches, Command};
+use toml::{Table, Value};
+
+use crate::error::{Error, Result};
+use crate::photo;
+
+/// What was typed, and behind it what the file of `--config` adds to it; `whole` is the whole command line's.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read, or says what no command knows.
+pub(super) fn expand(mut typed: Vec<OsString>, whole: &Command) -> Result<Vec<OsString>> {
+    // Whatever is wrong with what was typed is told when it is parsed for good.
+    let Ok(matches) = whole.clone().ignore_errors(true).try_get_matches_from(&typed) else { return Ok(typed) };
+    let Some((name, of_command)) = matches.subcommand() else { return Ok(typed) };
+    let path = matches.try_get_one::<PathBuf>("config").ok().flatten();
+    let path = path.or_else(|| of_command.try_get_one("config").ok().flatten());
+    let (Some(path), Some(command)) = (path, whole.find_subcommand(name)) else { return Ok(typed) };
+    check(path, whole)?;
+    let flags = File::read(path)?.flags(command, of_command)?;
+    let end = typed.iter().position(|token| token == "--").unwrap_or(typed.len());
+    typed.splice(end..end, flags.into_iter().map(OsString::from));
+    Ok(typed)
+}
+
+/// A file of flags.
+struct File<'a> {
+    path: &'a Path,
+    table: Table,
+}
+
+impl<'a> File<'a> {
+    fn read(path: &'a Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|error| Error::input(path, photo::why_unreadable(&error)))?;
+        let table = text.parse().map_err(|error: toml::de::Error| {
+            let error = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+            Error::input(path, format!("is no TOML ({error}); write lines such as tiles = 4000"))
+        })?;
+        Ok(Self { path, table })
+    }
+
+    /// The flags for `command`, of which `matches` was typed.
+    fn flags(&self, command: &Command, matches: &ArgMatches) -> Result<Vec<String>> {
+        let mut values: BTreeMap<&str, &Value> = BTreeMap::new();
+        for (key, value) in &self.table {
+            // Another command's table, or a flag that only others have.
+            if !value.is_table() && find(command, key).is_some() {
+                values.insert(key, value);
+            }
+        }
+        if let Some(Value::Table(own)) = self.table.get(command.get_name()) {
+            for (key, value) in own {
+                if find(command, key).is_none() {
+                    let name = command.get_name();
+                    let reason = format!("[{name}] has {key}, which is no flag of it; see smalti {name} --help");
+                    return Err(Error::input(self.path, reason));
+                }
+                values.insert(key, value);
+            }
+        }
+        let given = |argument: &Arg| {
+            let source = matches.value_source(argument.get_id().as_str());
+            matches!(source, Some(ValueSource::CommandLine | ValueSource::EnvVariable))
+        };
+        let mut flags = Vec::new();
+        for (key, value) in values {
+            let Some(argument) = find(command, key) else { continue };
+            let is_outdone = given(argument) || command.get_arg_conflicts_with(argument).into_iter().any(given);
+            if !is_outdone {
+                flags.extend(self.spelt(key, value)?);
+            }
+        }
+        Ok(flags)
+    }
+
+    /// A key as flags.
+    fn spelt(&self, key: &str, value: &Value) -> Result<Vec<String>> {
+        let values = if let Value::Array(values) = value { values.as_slice() } else { std::slice::from_ref(value) };
+        let spell = |value: &Value| match value {
+            Value::Boolean(true) => Ok(Some(format!("--{key}"))),
+            Value::Boolean(false) => Ok(None),
+            Value::Integer(number) => Ok(Some(format!("--{key}={number}"))),
+            Value::Float(number) => Ok(Some(format!("--{key}={number}"))),
+            Value::String(text) => Ok(Some(format!("--{key}={text}"))),
+            Value::Datetime(_) | Value::Array(_) | Value::Table(_) => {
+                let reason = format!("{key} must be a text, a number, true, false, or a list of such");
+                Err(Error::input(self.path, reason))
+            }
+        };
+        values.iter().filter_map(|value| spell(value).transpose()).collect()
+    }
+}
+
+/// Refuses a file with a key that no command has; `command` is the whole command line's.
+fn check(path: &Path, command: &Command) -> Result<()> {
+    let file = File::read(path)?;
+    for (key, value) in &file.table {
+        let is_known = match value {
+            Value::Table(_) => command.find_subcommand(key).is_some(),
+            _ => command.get_subcommands().any(|command| find(command, key).is_some()),
+        };
+        if !is_known {
+            let what = if value.is_table() { format!("[{key}] is no command") } else { format!("{key} is no flag") };
+            return Err(Error::input(path, format!("{what}; see smalti --help")));
+        }
+    }
+    Ok(())
+}
+
+/// The flag of a command that is called `name`.
+fn find<'c>(command: &'c Command, name: &str) -> Option<&'c Arg> {
+    command.get_arguments().find(|argument| argument.get_long() == Some(name) && name != "config")
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::app::Cli;
+
+    fn expanded(file: &str, typed: &str) -> Result<String> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("c.toml");
+        std::fs::write(&path, file).expect("the folder is ours");
+        let mut command = Cli::command();
+        command.build();
+        let config = path.display().to_string();
+        let typed = typed.replace("CONFIG", &config).split(' ').map(OsString::from).collect();
+        let tokens = expand(typed, &command)?;
+        let tokens: Vec<String> =
+            tokens.iter().map(|token| token.to_string_lossy().replace(&config, "CONFIG")).collect();
+        Ok(tokens.join(" "))
+    }
+
+    #[test]
+    fn what_is_typed_goes_before_the_file_and_a_table_before_the_top() {
+        let file =
+            "tiles = 7\nsize = 64\nstyle = 'mosaic'\n[evolve]\nsize = 32\nmask = ['disc', 'star']\nquiet = true\n";
+        let told = expanded(file, "smalti evolve a.png -o b.png --config CONFIG -n 9").expect("it is right");
+        let wanted = "smalti evolve a.png -o b.png --config CONFIG -n 9 --mask=disc --mask=star --quiet --size=32 --style=mosaic";
+        assert_eq!(told, wanted);
+        let told =
+            expanded(file, "smalti --config CONFIG evolve -o b.png --preset paint -- a.png").expect("it is right");
+        assert!(told.ends_with("--size=32 --tiles=7 -- a.png"), "a preset has a style of its own: {told}");
+        assert_eq!(expanded(file, "smalti evolve a.png -o b.png").expect("no file"), "smalti evolve a.png -o b.png");
+    }
+
+    #[test]
+    fn what_no_command_knows_is_refused_by_name() {
+        for (file, told) in [
+            ("tile = 7", "tile is no flag"),
+            ("[evolv]\ntiles = 7", "[evolv] is no command"),
+            ("[evolve]\nshard = '1/2'", "[evolve] has shard"),
+            ("size = 1979-05-27", "size must be"),
+            ("size = ", "is no TOML"),
+        ] {
+            let refusal = expanded(file, "smalti evolve a.png -o b.png --config CONFIG").expect_err(file).to_string();
+            assert!(refusal.contains(told), "{refusal}");
+        }
+    }
+}
