@@ -227,10 +227,18 @@ fn check_formats(formats: &[String]) -> Result<Vec<String>> {
 }
 
 /// A picture of a batch, for plans.
-pub(super) struct Planned {
+pub(super) struct Planned(Item);
+
+impl Planned {
     /// All that a manifest must say of it.
-    pub row: ManifestRow,
-    pub options: EvolveOptions,
+    pub(super) fn row(&self) -> &ManifestRow {
+        &self.0.row
+    }
+
+    /// How it would be evolved.
+    pub(super) fn options(&self) -> EvolveOptions {
+        self.0.options()
+    }
 }
 
 /// The pictures that a batch would evolve.
@@ -238,8 +246,7 @@ pub(super) struct Planned {
 /// # Errors
 /// As those of the batch, before it begins.
 pub(super) fn planned(args: &BatchArgs, cli: &Cli) -> Result<Vec<Planned>> {
-    let items = find(args, cli)?;
-    Ok(items.into_iter().map(|item| Planned { options: item.options(), row: item.row }).collect())
+    Ok(find(args, cli)?.into_iter().map(Planned).collect())
 }
 
 /// The ids of the pictures of a manifest, in its order.

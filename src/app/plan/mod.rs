@@ -88,7 +88,7 @@ pub(super) fn plan(args: &PlanArgs, cli: &Cli) -> ExitCode {
 fn write(args: &PlanArgs, cli: &Cli) -> Result<()> {
     refuse_flags(&args.batch)?;
     let items = batch::planned(&args.batch, cli)?;
-    let rows: Vec<&ManifestRow> = items.iter().map(|item| &item.row).collect();
+    let rows: Vec<&ManifestRow> = items.iter().map(Planned::row).collect();
     let groups: Vec<Option<&str>> = rows.iter().map(|row| row.group.as_deref()).collect();
     let picture_s = picture_s(args, &items);
     let shard_count = shard_count(args, items.len(), picture_s)?.min(shard::unit_count(&groups));
@@ -133,7 +133,7 @@ fn refuse_flags(batch: &BatchArgs) -> Result<()> {
 /// Seconds that a picture takes, as was said or as guessed where that is asked for.
 fn picture_s(args: &PlanArgs, items: &[Planned]) -> Option<f64> {
     let said = args.picture_time.map(|time| time.as_secs_f64());
-    said.or_else(|| estimate::picture_s(items.len(), |number| items[number].options.clone()))
+    said.or_else(|| estimate::picture_s(items.len(), |number| items[number].options()))
 }
 
 /// How many shards were asked for.

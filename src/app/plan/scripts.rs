@@ -110,7 +110,7 @@ exit "$code"
     /// An indexed job of Kubernetes.
     pub(super) fn kubernetes(&self) -> String {
         let heading = self.heading(
-            "# Needs Kubernetes 1.33 or later. Before `kubectl create -f kubernetes.yaml`, set the image and the volume, which\n\
+            "# Needs Kubernetes 1.29 or later. Before `kubectl create -f kubernetes.yaml`, set the image and the volume, which\n\
              # must hold inputs, plan and outputs at the path they have here, and resources such as nvidia.com/gpu.",
         );
         let (count, digits) = (self.shard_count, self.digits());
@@ -134,7 +134,6 @@ spec:
   completions: {count}
   parallelism: {parallelism}
   backoffLimitPerIndex: 3
-  maxFailedIndexes: {count}
   podFailurePolicy:
     rules:
       # 75: interrupted. The pod is made anew and goes on; this is no failure.
@@ -187,6 +186,8 @@ spec:
         let (count, digits) = (self.shard_count, self.digits());
         let (work_folder, folder) = (quoted(&self.work_folder), quoted(&self.folder));
         let arguments = self.arguments("        ");
+        // Absolute, since another machine begins in another folder.
+        let script = quoted(&format!("{}/parallel.sh", self.absolute(&self.folder)));
         format!(
             r#"#!/bin/sh
 {heading}
@@ -199,7 +200,7 @@ fi
 command -v parallel >/dev/null || {{ echo "parallel.sh: install GNU parallel" >&2; exit 1; }}
 log={folder}/parallel.log
 seq 1 {count} | parallel --will-cite --quote --jobs 1 --line-buffer --joblog "$log" --termseq TERM,60000,KILL,25 "$@" \
-    sh {folder}/parallel.sh --shard {{}}
+    sh {script} --shard {{}}
 # Columns 7 and 8 are exit code and signal of a shard. 75: run it again, as for one that a signal ended or that was not begun;
 # 3: some pictures failed.
 awk 'NR > 1 {{ if ($8 != 0 || $7 == 75) again = 1; else if ($7 == 3) some = 3; else if ($7 != 0) worst = $7 }}
