@@ -9,7 +9,7 @@ use smalti::engine::{Engine, Undisturbed};
 use smalti::error::Result;
 use smalti::evolve::{Evolution, PaperScheme};
 use smalti::gpu::GpuEvaluator;
-use smalti::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population};
+use smalti::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
 
 /// An evaluator that evaluates the whole picture after every generation: what incremental refresh is compared with.
 struct FullRefresh {
@@ -23,6 +23,12 @@ impl Evaluator for FullRefresh {
     }
     fn lane_count(&self) -> usize {
         self.inner.lane_count()
+    }
+    fn admit(&mut self, scene: Scene) -> Result<Option<usize>> {
+        self.inner.admit(scene)
+    }
+    fn release(&mut self, lane: usize) {
+        self.inner.release(lane);
     }
     fn load(&mut self, populations: &[(usize, &[Fly])]) -> Result<()> {
         self.flies = populations[0].1.to_vec();

@@ -47,16 +47,16 @@ layout(std430, binding = 10) coherent buffer StacksBuffer { uvec2 stacks[]; };
 // would show it and the weight less 1, then target and shade.
 layout(std430, binding = 11) coherent buffer ScratchBuffer { uint scratch[]; };
 
-layout(push_constant) uniform Push {
-    // Most turns of loops in one invocation.
-    uint budget;
-} push;
+// Where a pixel's nearest fly lies among the stacks; the next ones follow, one block of pixels apart.
+uint stack_first(uint place) {
+    return rule.first_stack + place / 64u * (STACK_DEPTH * 64u) + place % 64u;
+}
 
 #include "shared/cells_operators.glsl"
 
 // Marginal fitness tells what goes with a victim, its penalty included.
 int without_victim(uint index, Fly victim) {
-    return fitness[index];
+    return fitness[rule.first_fly + index];
 }
 
 #include "shared/cells_steps.glsl"
@@ -79,7 +79,8 @@ struct Seen {
 const uint SCRATCH_WORDS = 1u + DRESSED;
 
 uint scratch_place(uint place, uint word) {
-    return cell_number * rule.scratch_words + (place * SCRATCH_WORDS + word) * LANES + gl_LocalInvocationID.x;
+    return rule.first_scratch + cell_number * rule.scratch_words + (place * SCRATCH_WORDS + word) * LANES
+        + gl_LocalInvocationID.x;
 }
 
 uvec3 channels_of(uint color) {
@@ -257,7 +258,7 @@ bool has_room(Best best) {
             if (look_of(footprint, suit, pixel) != LOOK_HOLE) {
                 uint place = pixel_place(uvec2(pixel));
                 if (pixels[2u * place].x >> 24 == STACK_DEPTH) {
-                    uint first = place / 64u * 1024u + place % 64u;
+                    uint first = stack_first(place);
                     bool is_there = false;
                     [[unroll]] for (uint entry = 0u; entry < STACK_DEPTH; ++entry) {
                         is_there = is_there || stacks[first + entry * 64u].x == best.candidate.index;
@@ -285,7 +286,7 @@ struct Exchange {
 
 void add_fitness(uint fly, int amount) {
     if (fly != NO_FLY && amount != 0) {
-        atomicAdd(fitness[fly], amount);
+        atomicAdd(fitness[rule.first_fly + fly], amount);
     }
 }
 
@@ -293,7 +294,7 @@ uint depth_of(uint fly, Exchange change) {
     if (fly == NO_FLY) {
         return BACKGROUND_Z;
     }
-    return fly == change.fly ? change.z : flies[fly].z;
+    return fly == change.fly ? change.z : flies[rule.first_fly + fly].z;
 }
 
 // Takes the fly off a pixel's stack if it was there, and puts it there if it is seen there now. Returns the turns of its loop.
@@ -301,7 +302,7 @@ uint exchange_pixel(Exchange change, uint place, uint look) {
     uvec4 top = pixels[2u * place];
     uvec4 under = pixels[2u * place + 1u];
     uint depth = top.x >> 24;
-    uint first = place / 64u * 1024u + place % 64u;
+    uint first = stack_first(place);
     uvec2 own = uvec2(change.fly, uint(look_error(look, change.color, top.x, want_of(top.z))));
     uvec2 ground = uvec2(NO_FLY, under.w);
     uvec2 nearest = ground;
@@ -317,7 +318,7 @@ uint exchange_pixel(Exchange change, uint place, uint look) {
             changed = min(changed, entry);
             continue;
         }
-        uint z = flies[current.x].z;
+        uint z = flies[rule.first_fly + current.x].z;
         if (is_pending && (change.z < z || change.z == z && change.fly < current.x)) {
             stacks[first + count * 64u] = own;
             changed = min(changed, count);
@@ -384,14 +385,14 @@ void exchange(Exchange change, ivec4 boxes[2]) {
 }
 
 void main() {
-    rule = rules[0];
-    cell_number = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    uint round = header[0].round;
+    take_lane();
+    cell_number = work_number();
+    uint round = header[rule.lane].round;
     grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
-    if (header[0].pending == 0u || cell_number >= grid.columns * grid.rows) {
+    if (header[rule.lane].pending == 0u || cell_number >= grid.columns * grid.rows) {
         return;
     }
-    cell = cells[cell_number];
+    cell = cells[rule.first_cell + cell_number];
     if (cell.step == STEP_DONE) {
         return;
     }
@@ -420,8 +421,8 @@ void main() {
         uint draws = chain_then(chain, step);
         uint place = is_removal ? step - step_count : chain_below(draws, 0u, cell.count);
         uint index = member(place);
-        Fly fly = flies[index];
-        int place_fitness = fitness[index];
+        Fly fly = flies[rule.first_fly + index];
+        int place_fitness = fitness[rule.first_fly + index];
         Best best;
         best.candidate.is_valid = false;
         best.change = 0;
@@ -460,7 +461,7 @@ void main() {
         Exchange change;
         ivec4 boxes[2];
         if (is_accepted) {
-            old = flies[changed];
+            old = flies[rule.first_fly + changed];
             Fly child = best.candidate.fly;
             uint color = fly_color(child);
             bool is_kept = DRESSED == 0u && old.z == child.z && fly_color(old) == color;
@@ -486,16 +487,16 @@ void main() {
             if (is_accepted) {
                 Fly child = best.candidate.fly;
                 bool is_birth = best.candidate.paint == PAINT_BIRTH;
-                flies[changed] = child;
-                steps[changed] = is_birth || is_removal ? STEP_FIRST : grown(steps[changed]);
+                flies[rule.first_fly + changed] = child;
+                steps[rule.first_fly + changed] = is_birth || is_removal ? STEP_FIRST : grown(steps[rule.first_fly + changed]);
                 if (is_removal) {
-                    fitness[changed] = 0;
+                    fitness[rule.first_fly + changed] = 0;
                 } else if (TURN_PENALTY == 1u) {
                     int before = is_alive(old) ? turn_penalty(old, local_at(old)) : 0;
                     add_fitness(changed, before - turn_penalty(child, local_at(child)));
                 }
             } else if (was_changed) {
-                steps[index] = shrunk(steps[index]);
+                steps[rule.first_fly + index] = shrunk(steps[rule.first_fly + index]);
             }
         }
         if (is_accepted && !is_removal) {
@@ -508,12 +509,12 @@ void main() {
     }
     if (lane == 0u) {
         if (step == cell.step) {
-            atomicMax(header[0].overrun, cell_number + 1u);
+            atomicMax(header[rule.lane].overrun, cell_number + 1u);
         }
-        cells[cell_number].step = step == end ? STEP_DONE : step;
+        cells[rule.first_cell + cell_number].step = step == end ? STEP_DONE : step;
         add_to_header(evals, births, accepted, change_sum);
-        if (step == end && atomicAdd(header[0].pending, 0xFFFFFFFFu) == 1u) {
-            atomicAdd(header[0].round, 1u);
+        if (step == end && atomicAdd(header[rule.lane].pending, 0xFFFFFFFFu) == 1u) {
+            atomicAdd(header[rule.lane].round, 1u);
         }
     }
 }

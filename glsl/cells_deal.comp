@@ -34,22 +34,22 @@ uint deal_absent(Grid grid, uint draws) {
 }
 
 void main() {
-    rule = rules[0];
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
-    uint round = header[0].round;
-    if (index >= rule.fly_count || header[0].pending != 0u || round >= header[0].wanted) {
+    take_lane();
+    uint index = work_number() * 64u + gl_LocalInvocationID.x;
+    uint round = header[rule.lane].round;
+    if (index >= rule.fly_count || header[rule.lane].pending != 0u || round >= header[rule.lane].wanted) {
         return;
     }
     Grid grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
-    Fly fly = flies[index];
+    Fly fly = flies[rule.first_fly + index];
     uint cell = NO_CELL;
     if (is_alive(fly)) {
         cell = grid_cell_of(grid, footprint_of(fly, grid.size).box);
     } else if (first_round(index) <= round) {
         cell = deal_absent(grid, chain_then(chain_new(search_seed(), round, DRAW_DEAL), index));
     }
-    deals[index] = cell;
+    deals[rule.first_deal + index] = cell;
     if (cell != NO_CELL) {
-        atomicAdd(cells[cell].dealt, 1u);
+        atomicAdd(cells[rule.first_cell + cell].dealt, 1u);
     }
 }

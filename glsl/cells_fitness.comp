@@ -8,8 +8,6 @@ layout(local_size_x = 64) in;
 layout(constant_id = 5) const uint TURN_PENALTY = 1u;
 layout(constant_id = 6) const uint LOCAL_SIZE = 1u;
 layout(constant_id = 7) const uint DRESSED = 1u;
-// The colour behind all tiles, packed.
-layout(constant_id = 8) const uint BACKGROUND = 0u;
 // 0: an invocation is a fly; 1: it is a pixel.
 layout(constant_id = 9) const uint OF_PIXELS = 0u;
 const uint RANDOM_DEPTH = 0u;
@@ -33,8 +31,8 @@ layout(std430, binding = 10) readonly buffer StacksBuffer { uvec2 stacks[]; };
 
 void begin_fly(uint index) {
     if (index < rule.fly_count) {
-        Fly fly = flies[index];
-        fitness[index] = is_alive(fly) ? -turn_penalty(fly, guide_at(ivec2(fly.x, fly.y) >> 6)) : 0;
+        Fly fly = flies[rule.first_fly + index];
+        fitness[rule.first_fly + index] = is_alive(fly) ? -turn_penalty(fly, guide_at(ivec2(fly.x, fly.y) >> 6)) : 0;
     }
 }
 
@@ -46,33 +44,34 @@ int error_behind(Compositing pixel, uint stack, uint first, uint depth, uvec4 to
             add_layer(pixel, entry + part < depth ? stacks[stack + place * 64u].y : 0u);
         }
     }
-    uvec3 sums = pixel.sums + pixel.transmittance * channels(BACKGROUND);
+    uvec3 sums = pixel.sums + pixel.transmittance * channels(rule.background);
     return glazed_error(sums, pixel.transmittance, top.x, want_of(top.z));
 }
 
 void main() {
-    rule = rules[0];
-    if (header[0].is_fresh != ROUND_OVER) {
+    take_lane();
+    if (header[rule.lane].is_fresh != ROUND_OVER) {
         return;
     }
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    uint index = work_number() * 64u + gl_LocalInvocationID.x;
     if (OF_PIXELS == 0u) {
         begin_fly(index);
         return;
     }
-    if (2u * index >= pixels.length()) {
+    if (index >= pixel_count()) {
         return;
     }
-    uvec4 top = pixels[2u * index];
+    uint pixel = rule.first_pixel + index;
+    uvec4 top = pixels[2u * pixel];
     uint depth = top.x >> 24;
-    uint stack = stack_first(index);
+    uint stack = stack_first(pixel);
     Compositing before = START;
     for (uint entry = 0u; entry < depth; ++entry) {
         // Exact: what is left out rounds no more.
         int rise = error_behind(before, stack, entry + 1u, depth, top) - int(top.w);
         uvec2 layer = stacks[stack + entry * 64u];
         if (rise != 0) {
-            atomicAdd(fitness[layer.x], rise);
+            atomicAdd(fitness[rule.first_fly + layer.x], rise);
         }
         add_layer(before, layer.y);
     }

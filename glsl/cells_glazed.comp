@@ -20,8 +20,6 @@ layout(constant_id = 4) const uint RANDOM_DEPTH = 0u;
 layout(constant_id = 5) const uint TURN_PENALTY = 1u;
 layout(constant_id = 6) const uint LOCAL_SIZE = 1u;
 layout(constant_id = 7) const uint DRESSED = 1u;
-// The colour behind all tiles, packed.
-layout(constant_id = 8) const uint BACKGROUND = 0u;
 
 const uint LANES = gl_WorkGroupSize.x;
 
@@ -47,11 +45,6 @@ layout(std430, binding = 10) coherent buffer StacksBuffer { uvec2 stacks[]; };
 // Per cell the pixels where a child shows its colour, a column for each invocation: the sums of all else with the child's shade
 // and two bytes of its weight in their highest bytes, then the target with the pixel's weight less 1 and the rest of the child's.
 layout(std430, binding = 11) coherent buffer ScratchBuffer { uint scratch[]; };
-
-layout(push_constant) uniform Push {
-    // Most turns of loops in one invocation.
-    uint budget;
-} push;
 
 #include "shared/cells_operators.glsl"
 
@@ -110,7 +103,7 @@ Folded fold(Swap change, uint stack, uint depth, uint child_opacity) {
             uvec2 layer = stacks[stack + (entry + part) * 64u];
             bool is_there = entry + part < depth;
             bool is_own = is_there && layer.x == change.fly;
-            uint z = is_there ? flies[layer.x].z : BACKGROUND_Z;
+            uint z = is_there ? flies[rule.first_fly + layer.x].z : BACKGROUND_Z;
             bool is_front = change.z < z || change.z == z && change.fly < layer.x;
             uint left = kept(folded.rest.transmittance, is_front ? waiting : 0u);
             waiting = is_front ? 0u : waiting;
@@ -123,7 +116,7 @@ Folded fold(Swap change, uint stack, uint depth, uint child_opacity) {
     uint left = kept(folded.rest.transmittance, waiting);
     folded.weight += folded.rest.transmittance - left;
     folded.rest.transmittance = left;
-    folded.rest.sums += left * channels(BACKGROUND);
+    folded.rest.sums += left * channels(rule.background);
     return folded;
 }
 
@@ -143,7 +136,7 @@ struct Laid {
 };
 
 uint scratch_place(uint place, uint word) {
-    return cell_number * rule.scratch_words + (place * 4u + word) * LANES + gl_LocalInvocationID.x;
+    return rule.first_scratch + cell_number * rule.scratch_words + (place * 4u + word) * LANES + gl_LocalInvocationID.x;
 }
 
 void lay_pixel(inout Laid laid, Folded folded, uint shade, uvec4 top) {
@@ -261,7 +254,7 @@ struct Best {
 
 // Evaluates a candidate; it takes the best one's place if it is better. False if it is invalid after all.
 bool evaluate(Candidate candidate, inout Best best) {
-    Swap change = swap_of(candidate.index, flies[candidate.index], candidate.fly);
+    Swap change = swap_of(candidate.index, flies[rule.first_fly + candidate.index], candidate.fly);
     if (!afford(CANDIDATE_TURNS) || !fits(swap_turns(change, STACK_TURNS))) {
         return false;
     }
@@ -333,7 +326,7 @@ void exchange_pixel(Swap change, uint place, uvec4 top, uvec2 texel) {
             // Read before its place may be written.
             next = stacks[stack + min(entry + part + 1u, GLAZED_DEPTH - 1u) * 64u];
             if (entry + part < depth && current.x != change.fly) {
-                uint z = flies[current.x].z;
+                uint z = flies[rule.first_fly + current.x].z;
                 if (is_waiting && (change.z < z || change.z == z && change.fly < current.x)) {
                     stacks[stack + count * 64u] = own;
                     nearest = count == 0u ? uvec2(change.fly, change.z) : nearest;
@@ -356,7 +349,7 @@ void exchange_pixel(Swap change, uint place, uvec4 top, uvec2 texel) {
         add_layer(pixel, own.y);
         ++count;
     }
-    uvec3 sums = pixel.sums + pixel.transmittance * channels(BACKGROUND);
+    uvec3 sums = pixel.sums + pixel.transmittance * channels(rule.background);
     int error = glazed_error(sums, pixel.transmittance, top.x, want_of(top.z));
     pixels[2u * place] =
         uvec4(top.x & 0xFFFFFFu | count << 24, nearest.x, nearest.y | top.z & ~TOP_Z_MASK, uint(error));
@@ -389,14 +382,14 @@ void exchange(Swap change) {
 }
 
 void main() {
-    rule = rules[0];
-    cell_number = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    uint round = header[0].round;
+    take_lane();
+    cell_number = work_number();
+    uint round = header[rule.lane].round;
     grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
-    if (header[0].pending == 0u || cell_number >= grid.columns * grid.rows) {
+    if (header[rule.lane].pending == 0u || cell_number >= grid.columns * grid.rows) {
         return;
     }
-    cell = cells[cell_number];
+    cell = cells[rule.first_cell + cell_number];
     if (cell.step == STEP_DONE) {
         return;
     }
@@ -425,8 +418,8 @@ void main() {
         uint draws = chain_then(chain, step);
         uint place = is_removal ? step - step_count : chain_below(draws, 0u, cell.count);
         uint index = member(place);
-        Fly fly = flies[index];
-        int place_fitness = fitness[index];
+        Fly fly = flies[rule.first_fly + index];
+        int place_fitness = fitness[rule.first_fly + index];
         Best best;
         best.candidate.is_valid = false;
         best.change = 0;
@@ -456,7 +449,7 @@ void main() {
         Swap change;
         uint changed = best.candidate.index;
         if (is_accepted && !is_over) {
-            change = swap_of(changed, flies[changed], best.candidate.fly);
+            change = swap_of(changed, flies[rule.first_fly + changed], best.candidate.fly);
             fits(swap_turns(change, STACK_TURNS));
         }
         if (is_over) {
@@ -472,11 +465,11 @@ void main() {
         if (lane == 0u) {
             if (is_accepted) {
                 bool is_birth = best.candidate.paint == PAINT_BIRTH;
-                flies[changed] = best.candidate.fly;
-                steps[changed] = is_birth || is_removal ? STEP_FIRST : grown(steps[changed]);
-                fitness[changed] = is_removal ? 0 : fitness[changed] - best.change;
+                flies[rule.first_fly + changed] = best.candidate.fly;
+                steps[rule.first_fly + changed] = is_birth || is_removal ? STEP_FIRST : grown(steps[rule.first_fly + changed]);
+                fitness[rule.first_fly + changed] = is_removal ? 0 : fitness[rule.first_fly + changed] - best.change;
             } else if (was_changed) {
-                steps[index] = shrunk(steps[index]);
+                steps[rule.first_fly + index] = shrunk(steps[rule.first_fly + index]);
             }
         }
         if (is_accepted && !is_removal) {
@@ -489,13 +482,13 @@ void main() {
     }
     if (lane == 0u) {
         if (step == cell.step) {
-            atomicMax(header[0].overrun, cell_number + 1u);
+            atomicMax(header[rule.lane].overrun, cell_number + 1u);
         }
-        cells[cell_number].step = step == end ? STEP_DONE : step;
+        cells[rule.first_cell + cell_number].step = step == end ? STEP_DONE : step;
         add_to_header(evals, births, accepted, change_sum);
-        if (step == end && atomicAdd(header[0].pending, 0xFFFFFFFFu) == 1u) {
-            header[0].is_fresh = ROUND_OVER;
-            atomicAdd(header[0].round, 1u);
+        if (step == end && atomicAdd(header[rule.lane].pending, 0xFFFFFFFFu) == 1u) {
+            header[rule.lane].is_fresh = ROUND_OVER;
+            atomicAdd(header[rule.lane].round, 1u);
         }
     }
 }

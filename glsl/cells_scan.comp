@@ -15,10 +15,10 @@ shared uint counts[THREADS];
 shared uint busy[THREADS];
 
 void main() {
-    rule = rules[0];
+    take_lane();
     uint thread = gl_LocalInvocationID.x;
-    uint round = header[0].round;
-    bool begins = header[0].pending == 0u && round < header[0].wanted;
+    uint round = header[rule.lane].round;
+    bool begins = header[rule.lane].pending == 0u && round < header[rule.lane].wanted;
     Grid grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
     uint cell_count = begins ? grid.columns * grid.rows : 0u;
     // Each invocation takes a run of cells.
@@ -28,8 +28,8 @@ void main() {
     uint count = 0u;
     uint busy_count = 0u;
     for (uint cell = first_cell; cell < end_cell; ++cell) {
-        count += cells[cell].dealt;
-        busy_count += cells[cell].dealt > 0u ? 1u : 0u;
+        count += cells[rule.first_cell + cell].dealt;
+        busy_count += cells[rule.first_cell + cell].dealt > 0u ? 1u : 0u;
     }
     counts[thread] = count;
     busy[thread] = busy_count;
@@ -42,17 +42,17 @@ void main() {
         total_busy += busy[other];
     }
     for (uint cell = first_cell; cell < end_cell; ++cell) {
-        uint dealt = cells[cell].dealt;
-        cells[cell] = CellRecord(first, dealt, dealt > 0u ? 0u : STEP_DONE, 0u, 0u);
+        uint dealt = cells[rule.first_cell + cell].dealt;
+        cells[rule.first_cell + cell] = CellRecord(first, dealt, dealt > 0u ? 0u : STEP_DONE, 0u, 0u);
         first += dealt;
     }
     if (thread == 0u) {
-        header[0].iterations += begins || header[0].pending != 0u ? 1u : 0u;
-        header[0].is_fresh = begins ? 1u : 0u;
+        header[rule.lane].iterations += begins || header[rule.lane].pending != 0u ? 1u : 0u;
+        header[rule.lane].is_fresh = begins ? 1u : 0u;
         if (begins) {
-            header[0].pending = total_busy;
+            header[rule.lane].pending = total_busy;
             // A round in which no cell has a fly is over at once.
-            header[0].round = total_busy == 0u ? round + 1u : round;
+            header[rule.lane].round = total_busy == 0u ? round + 1u : round;
         }
     }
 }

@@ -10,15 +10,15 @@
 layout(local_size_x = 64) in;
 
 void main() {
-    rule = rules[0];
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    take_lane();
+    uint index = work_number() * 64u + gl_LocalInvocationID.x;
     uint fly_count = rule.fly_count;
-    if (index >= fly_count || header[0].is_fresh == 0u) {
+    if (index >= fly_count || header[rule.lane].is_fresh == 0u) {
         return;
     }
-    uint cell = deals[index];
+    uint cell = deals[rule.first_deal + index];
     if (cell != NO_CELL) {
-        uint place = cells[cell].first + atomicAdd(cells[cell].filled, 1u);
-        deals[fly_count + place] = index;
+        uint place = cells[rule.first_cell + cell].first + atomicAdd(cells[rule.first_cell + cell].filled, 1u);
+        deals[rule.first_deal + fly_count + place] = index;
     }
 }

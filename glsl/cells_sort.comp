@@ -11,20 +11,20 @@
 layout(local_size_x = 64) in;
 
 void main() {
-    rule = rules[0];
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
+    take_lane();
+    uint index = work_number() * 64u + gl_LocalInvocationID.x;
     uint fly_count = rule.fly_count;
-    if (index >= fly_count || header[0].is_fresh == 0u || deals[index] == NO_CELL) {
+    if (index >= fly_count || header[rule.lane].is_fresh == 0u || deals[rule.first_deal + index] == NO_CELL) {
         return;
     }
-    CellRecord cell = cells[deals[index]];
+    CellRecord cell = cells[rule.first_cell + deals[rule.first_deal + index]];
     uint rank = 0u;
     // Eight in each turn of the loop, which software Vulkan ends after 65,535 turns.
     for (uint place = 0u; place < cell.count; place += 8u) {
         [[unroll]] for (uint part = 0u; part < 8u; ++part) {
-            uint other = deals[fly_count + cell.first + min(place + part, cell.count - 1u)];
+            uint other = deals[rule.first_deal + fly_count + cell.first + min(place + part, cell.count - 1u)];
             rank += place + part < cell.count && other < index ? 1u : 0u;
         }
     }
-    deals[2u * fly_count + cell.first + rank] = index;
+    deals[rule.first_deal + 2u * fly_count + cell.first + rank] = index;
 }

@@ -23,6 +23,9 @@ layout(constant_id = 2) const uint PIXELS_PER_THREAD = 8u;
 layout(constant_id = 4) const uint MASKED = 1u;
 // 1: sums may not fit 32 bits, so carries go to the high word.
 layout(constant_id = 5) const uint WIDE_SUMS = 1u;
+// 1: some lists are looked at in pieces, so that layers are taken over from an earlier dispatch. Software Vulkan would load
+// them for nothing.
+layout(constant_id = 6) const uint PIECES = 1u;
 // 1: only the SAE of the top layer, with one fly left out: a plain re-render, the baseline of the benches.
 layout(constant_id = 3) const uint RE_RENDER = 0u;
 
@@ -117,10 +120,21 @@ void main() {
 
     uint top[PIXELS_PER_THREAD];
     uint under[PIXELS_PER_THREAD];
-    bool continued = (item.flags & FLAG_CONTINUED) != 0u;
+    // Colours of both, unless shades come into them: to look them up afterwards is dear.
+    uint top_color[PIXELS_PER_THREAD];
+    uint under_color[PIXELS_PER_THREAD];
+    bool continued = PIECES == 1u && (item.flags & FLAG_CONTINUED) != 0u;
     [[unroll]] for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
-        top[p] = continued ? top_layer[first_pixel + p * BLOCK_SIDE] : NO_FLY;
-        under[p] = continued ? under_layer[first_pixel + p * BLOCK_SIDE] : NO_FLY;
+        top[p] = NO_FLY;
+        under[p] = NO_FLY;
+        top_color[p] = lane.background;
+        under_color[p] = lane.background;
+        if (PIECES == 1u && continued) {
+            top[p] = top_layer[first_pixel + p * BLOCK_SIDE];
+            under[p] = under_layer[first_pixel + p * BLOCK_SIDE];
+            top_color[p] = shown_color(lane, top[p]);
+            under_color[p] = shown_color(lane, under[p]);
+        }
     }
 
     for (uint entry = item.first_entry; entry < item.first_entry + item.entry_count; ++entry) {
@@ -140,12 +154,15 @@ void main() {
                 covered = covered && texel.x >= COVERAGE_THRESHOLD;
                 shown = fly << SHADE_BITS | texel.y;
             }
-            uint candidate = covered ? shown : NO_FLY;
+            bool is_top = covered && top[p] == NO_FLY;
             if (RE_RENDER == 0u) {
-                under[p] = top[p] != NO_FLY && under[p] == NO_FLY ? candidate : under[p];
+                bool is_under = covered && !is_top && under[p] == NO_FLY;
+                under[p] = is_under ? shown : under[p];
+                under_color[p] = is_under ? tile.color : under_color[p];
                 open = open || under[p] == NO_FLY;
             }
-            top[p] = top[p] == NO_FLY ? candidate : top[p];
+            top[p] = is_top ? shown : top[p];
+            top_color[p] = is_top ? tile.color : top_color[p];
             if (RE_RENDER == 1u) {
                 open = open || top[p] == NO_FLY;
             }
@@ -157,38 +174,48 @@ void main() {
     }
 
     bool fresh = (item.flags & FLAG_FRESH) != 0u;
-    bool unfinished = (item.flags & FLAG_UNFINISHED) != 0u;
+    bool unfinished = PIECES == 1u && (item.flags & FLAG_UNFINISHED) != 0u;
     int error_change = 0;
     [[unroll]] for (uint p = 0u; p < PIXELS_PER_THREAD; ++p) {
         uint pixel = first_pixel + p * BLOCK_SIDE;
         uint target = targets[pixel];
         bool inside = (target & INSIDE) != 0u;
+        if (MASKED == 1u) {
+            top_color[p] = shown_color(lane, top[p]);
+            under_color[p] = shown_color(lane, under[p]);
+        }
         if (RE_RENDER == 1u) {
-            int shown_error = color_error(target, shown_color(lane, top[p]));
+            int shown_error = color_error(target, top_color[p]);
             error_change += inside ? shown_error : 0;
             continue;
         }
+        uint old_top = NO_FLY;
+        int old_part = 0;
         if (!continued && !fresh) {
             int old = parts[pixel];
-            if (top_layer[pixel] != NO_FLY) {
-                add_marginal(lane.first_fly + top_layer[pixel], -(old >> 10));
-            }
+            old_top = top_layer[pixel];
+            old_part = old >> 10;
             error_change -= old & 1023;
         }
         // The next dispatch needs the shades, too.
         top_layer[pixel] = unfinished ? top[p] : fly_of(top[p]);
         under_layer[pixel] = unfinished ? under[p] : fly_of(under[p]);
-        if (!unfinished) {
-            int top_error = color_error(target, shown_color(lane, top[p]));
-            int under_error = color_error(target, shown_color(lane, under[p]));
-            int part = inside ? under_error - top_error : 0;
-            top_error = inside ? top_error : 0;
-            if (top[p] != NO_FLY) {
-                add_marginal(lane.first_fly + fly_of(top[p]), part);
-            }
-            error_change += top_error;
-            parts[pixel] = part << 10 | top_error;
+        int top_error = color_error(target, top_color[p]);
+        int under_error = color_error(target, under_color[p]);
+        bool counts = inside && !unfinished;
+        int part = counts ? under_error - top_error : 0;
+        top_error = counts ? top_error : 0;
+        uint new_top = unfinished ? NO_FLY : fly_of(top[p]);
+        // Most pixels of a block show what they showed, and atomics are dear.
+        bool same = old_top == new_top;
+        if (old_top != NO_FLY) {
+            add_marginal(lane.first_fly + old_top, same ? part - old_part : -old_part);
         }
+        if (new_top != NO_FLY && !same) {
+            add_marginal(lane.first_fly + new_top, part);
+        }
+        error_change += top_error;
+        parts[pixel] = part << 10 | top_error;
     }
     int subgroup_change = subgroupAdd(error_change);
     if (subgroupElect()) {

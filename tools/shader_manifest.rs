@@ -13,9 +13,10 @@ use sha2::{Digest, Sha256};
 pub const OPTIONS: &str = "target=vulkan1.3 optimization=none warnings=errors";
 
 /// The shader stages, as named in `glsl/`; the module of `evaluate.comp` is `spirv/evaluate.comp.spv`.
-pub const STAGES: [&str; 12] = [
+pub const STAGES: [&str; 13] = [
     "cells.comp",
     "cells_deal.comp",
+    "cells_depths.comp",
     "cells_fitness.comp",
     "cells_glazed.comp",
     "cells_scan.comp",

@@ -13,7 +13,7 @@ const uint ROUND_OVER = 2u;
 
 // Where a pixel's nearest tile lies among the stacks; the next ones follow, one block of pixels apart.
 uint stack_first(uint place) {
-    return place / 64u * (GLAZED_DEPTH * 64u) + place % 64u;
+    return rule.first_stack + place / 64u * (GLAZED_DEPTH * 64u) + place % 64u;
 }
 
 uint stack_turns(uint depth) {
@@ -24,7 +24,7 @@ uint stack_turns(uint depth) {
 uvec2 texel_of(Footprint footprint, Tile suit, ivec2 pixel) {
     uvec2 texel = uvec2(255u);
     if (suit.mask > 0u) {
-        texel = mask_texel(suit.mask, suit, uvec2(footprint_coordinates(footprint, pixel)));
+        texel = mask_texel(rule.first_mask + suit.mask, suit, uvec2(footprint_coordinates(footprint, pixel)));
     }
     return footprint_covers(footprint, pixel) ? texel : uvec2(0u);
 }

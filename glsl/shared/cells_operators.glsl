@@ -21,7 +21,7 @@ struct GuideSample {
 
 GuideSample guide_at(ivec2 pixel) {
     uvec2 place = min(uvec2(max(pixel, ivec2(0))) >> 2, uvec2(rule.guide_columns, rule.guide_rows) - 1u);
-    uvec2 words = guide[place.y * rule.guide_columns + place.x];
+    uvec2 words = guide[rule.first_guide + place.y * rule.guide_columns + place.x];
     return GuideSample(words.x & 0xFFFFu, words.x >> 16, words.y);
 }
 

@@ -76,6 +76,19 @@ struct SearchRules {
     uint first_round_1;
     uint first_round_2;
     uint first_round_3;
+    // The colour behind all tiles, packed.
+    uint background;
+    // Where the lane lies in the buffers that all lanes share. Of the stacks: where it would if its first pixel were pixel 0; such
+    // sums wrap around.
+    uint lane;
+    uint first_fly;
+    uint first_deal;
+    uint first_cell;
+    uint first_pixel;
+    uint first_stack;
+    uint first_scratch;
+    uint first_guide;
+    uint first_mask;
 };
 
 struct Header {
@@ -113,9 +126,28 @@ struct CellRecord {
     uint filled;
 };
 
+layout(push_constant) uniform Push {
+    // Of the lanes that work, the one that workgroups with z = 0 serve.
+    uint first_lane;
+    // Most turns of loops in one invocation.
+    uint budget;
+} push;
+
+// Of the lanes that work, those of a kind side by side.
 layout(std430, binding = 0) readonly buffer RulesBuffer { SearchRules rules[]; };
-// The rules, read once: software Vulkan reads a buffer for each invocation anew. `main` does it first.
+// The rules of this lane, read once: software Vulkan reads a buffer for each invocation anew.
 SearchRules rule;
+
+// Begins the work for a lane: `main` does it first.
+void take_lane() {
+    rule = rules[push.first_lane + gl_WorkGroupID.z];
+}
+
+// The number of this workgroup among those of its lane.
+uint work_number() {
+    return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+}
+
 
 layout(std430, binding = 1) coherent buffer HeaderBuffer { Header header[]; };
 layout(std430, binding = 2) coherent buffer FliesBuffer { Fly flies[]; };
@@ -145,7 +177,12 @@ bool is_alive(Fly fly) {
 }
 
 uint pixel_place(uvec2 pixel) {
-    return ((pixel.y >> 3) * rule.columns + (pixel.x >> 3)) * 64u + (pixel.y & 7u) * 8u + (pixel.x & 7u);
+    return rule.first_pixel + ((pixel.y >> 3) * rule.columns + (pixel.x >> 3)) * 64u + (pixel.y & 7u) * 8u + (pixel.x & 7u);
+}
+
+// Pixels of all blocks of the lane.
+uint pixel_count() {
+    return rule.columns * (rule.height + 7u >> 3) * 64u;
 }
 
 uvec2 picture_size() {

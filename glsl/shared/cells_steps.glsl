@@ -1,5 +1,5 @@
 // What the steps of a cell have in common, whatever its tiles are: the candidates, their making, and counters. Twin:
-// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_grid.glsl, cells_patches.glsl, cells_suit.glsl, a push constant `budget`, and
+// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_grid.glsl, cells_patches.glsl, cells_suit.glsl and
 // `without_victim`: what the objective changes when a child's victim goes, as far as no pixel has to be looked at for it.
 
 const uint PAINT_KEEP = 0u;
@@ -56,7 +56,7 @@ bool afford(uint count) {
 }
 
 uint member(uint place) {
-    return deals[2u * rule.fly_count + cell.first + place];
+    return deals[rule.first_deal + 2u * rule.fly_count + cell.first + place];
 }
 
 void store_candidate(uint slot, Candidate candidate) {
@@ -103,7 +103,7 @@ uint least_helpful(uint draws) {
     uint best = 0u;
     for (uint number = 0u; number < rule.victim_tournament; ++number) {
         uint place = chain_below(draws, SLOT_VICTIM + number, cell.count);
-        int value = fitness[member(place)];
+        int value = fitness[rule.first_fly + member(place)];
         best = value < least ? place : best;
         least = min(value, least);
     }
@@ -137,8 +137,8 @@ void make_birth(inout Candidate candidate, uint place, int place_fitness, uint d
     uint index = member(candidate.victim);
     if (MUTANTS == 1u) {
         uint parent = member(chain_below(draws, SLOT_PLACE, cell.count));
-        candidate.is_valid = fitness[parent] > 0;
-        Fly fly = flies[parent];
+        candidate.is_valid = fitness[rule.first_fly + parent] > 0;
+        Fly fly = flies[rule.first_fly + parent];
         candidate.fly = mutant(fly, own_side(index, local_at(fly)), draws);
     } else {
         uvec3 worst = worst_pixel(draws);
@@ -182,10 +182,10 @@ Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uin
     if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.birth_q16) {
         make_birth(candidate, place, place_fitness, draws);
     } else {
-        make_change(candidate, fly, index, steps[index], draws);
+        make_change(candidate, fly, index, steps[rule.first_fly + index], draws);
     }
     candidate.index = member(candidate.victim);
-    Fly old = flies[candidate.index];
+    Fly old = flies[rule.first_fly + candidate.index];
     GuideSample local = local_at(candidate.fly);
     bound_sides(candidate.fly, own_side(candidate.index, local));
     Fly child = candidate.fly;
@@ -215,12 +215,12 @@ void add_wide(inout uvec2 sum, int amount) {
 }
 
 void add_to_header(uvec2 evals, uvec2 births, uvec2 accepted, uvec2 change) {
-    uint old = atomicAdd(header[0].evals_low, evals.x);
-    atomicAdd(header[0].evals_high, evals.y + (old + evals.x < old ? 1u : 0u));
-    old = atomicAdd(header[0].births_low, births.x);
-    atomicAdd(header[0].births_high, births.y + (old + births.x < old ? 1u : 0u));
-    old = atomicAdd(header[0].accepted_low, accepted.x);
-    atomicAdd(header[0].accepted_high, accepted.y + (old + accepted.x < old ? 1u : 0u));
-    old = atomicAdd(header[0].change_low, change.x);
-    atomicAdd(header[0].change_high, change.y + (old + change.x < old ? 1u : 0u));
+    uint old = atomicAdd(header[rule.lane].evals_low, evals.x);
+    atomicAdd(header[rule.lane].evals_high, evals.y + (old + evals.x < old ? 1u : 0u));
+    old = atomicAdd(header[rule.lane].births_low, births.x);
+    atomicAdd(header[rule.lane].births_high, births.y + (old + births.x < old ? 1u : 0u));
+    old = atomicAdd(header[rule.lane].accepted_low, accepted.x);
+    atomicAdd(header[rule.lane].accepted_high, accepted.y + (old + accepted.x < old ? 1u : 0u));
+    old = atomicAdd(header[rule.lane].change_low, change.x);
+    atomicAdd(header[rule.lane].change_high, change.y + (old + change.x < old ? 1u : 0u));
 }

@@ -47,7 +47,7 @@ Tile suit_of(Fly fly) {
 uint look_at(Tile suit, ivec2 end, uvec2 uv) {
     uvec2 texel = uvec2(255u);
     if (suit.mask > 0u) {
-        texel = mask_texel(suit.mask, suit, uv);
+        texel = mask_texel(rule.first_mask + suit.mask, suit, uv);
     }
     uvec2 inner = uvec2(end) - min(uvec2(end), uvec2(2u * suit.ring));
     uint look = all(lessThan(uv - suit.ring, inner)) ? texel.y : LOOK_GROUT;

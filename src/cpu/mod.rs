@@ -19,49 +19,70 @@ use lane_evaluation::LaneEvaluation;
 /// The evaluator that needs no device.
 #[derive(Debug)]
 pub struct CpuEvaluator {
-    lanes: Vec<LaneEvaluation>,
+    lanes: Vec<Option<LaneEvaluation>>,
 }
 
 impl CpuEvaluator {
     /// An evaluator with one lane per scene, each empty until it is loaded.
     #[must_use]
     pub fn new(scenes: Vec<Scene>) -> Self {
-        Self { lanes: scenes.into_iter().map(LaneEvaluation::new).collect() }
+        Self { lanes: scenes.into_iter().map(LaneEvaluation::new).map(Some).collect() }
+    }
+
+    fn known(&self, lane: usize) -> &LaneEvaluation {
+        self.lanes[lane].as_ref().expect("the lane was released")
+    }
+
+    fn known_mut(&mut self, lane: usize) -> &mut LaneEvaluation {
+        self.lanes[lane].as_mut().expect("the lane was released")
     }
 }
 
 impl Evaluator for CpuEvaluator {
     fn lane(&self, lane: usize) -> &Lane {
-        self.lanes[lane].lane()
+        self.known(lane).lane()
     }
 
     fn lane_count(&self) -> usize {
-        self.lanes.len()
+        self.lanes.iter().flatten().count()
+    }
+
+    fn admit(&mut self, scene: Scene) -> Result<Option<usize>> {
+        let number = self.lanes.iter().position(Option::is_none).unwrap_or(self.lanes.len());
+        if number == self.lanes.len() {
+            self.lanes.push(None);
+        }
+        self.lanes[number] = Some(LaneEvaluation::new(scene));
+        Ok(Some(number))
+    }
+
+    fn release(&mut self, lane: usize) {
+        self.lanes[lane] = None;
     }
 
     fn load(&mut self, populations: &[(usize, &[Fly])]) -> Result<()> {
         for &(lane, flies) in populations {
-            self.lanes[lane].load(flies);
+            self.known_mut(lane).load(flies);
         }
         Ok(())
     }
 
     fn replace(&mut self, changes: &[Change]) -> Result<()> {
         for change in changes {
-            self.lanes[change.lane].replace(change.index, &change.fly);
+            self.known_mut(change.lane).replace(change.index, &change.fly);
         }
-        for lane in &mut self.lanes {
+        for lane in self.lanes.iter_mut().flatten() {
             lane.refresh_touched();
         }
         Ok(())
     }
 
     fn evaluation(&self, lane: usize) -> Evaluation<'_> {
-        self.lanes[lane].evaluation()
+        self.known(lane).evaluation()
     }
 
     fn read_back_layers(&mut self, lane: usize) -> Result<Layers> {
-        Ok(self.lanes[lane].layers())
+        Ok(self.known(lane).layers())
     }
 
     fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {

@@ -123,47 +123,110 @@ pub fn run(
         search.load(flies)?;
     }
     observer.at_start(search)?;
-    let mut mark = search.standing();
-    let mut idle_epochs = 0;
+    let pace = if observer.looks_at_rounds() { Pace::Rounds } else { Pace::Epochs };
+    let mut drive = Drive::new(search, *budget, pace);
     loop {
-        if let Some(reason) = spent(search, budget, &mut mark)? {
-            return Ok(reason);
-        }
-        let evals = search.standing().evals;
-        advance(search, budget, observer)?;
-        idle_epochs = if search.standing().evals == evals { idle_epochs + 1 } else { 0 };
-        if idle_epochs == IDLE_EPOCHS_MAX {
-            return Ok(StopReason::Dry);
-        }
-        if let Some(reason) = observer.after_epoch(search)? {
-            return Ok(reason);
+        match drive.next(search)? {
+            Next::Advance(rounds) => {
+                search.advance(rounds)?;
+                if pace == Pace::Rounds {
+                    observer.after_round(search)?;
+                }
+            }
+            Next::Spread => {
+                search.renormalise()?;
+                if let Some(reason) = drive.end_epoch(search.standing()) {
+                    return Ok(reason);
+                }
+                if let Some(reason) = observer.after_epoch(search)? {
+                    return Ok(reason);
+                }
+            }
+            Next::Done(reason) => return Ok(reason),
         }
     }
 }
 
-/// Makes an epoch of rounds, fewer if the evals of the budget are spent before, and spreads the depths at its end.
+/// How many rounds a search is asked for at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// Each alone.
+    Rounds,
+    /// Those of an epoch, where the budget allows, so that a device need not wait between them.
+    Epochs,
+}
+
+/// What a search does next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// So many rounds.
+    Advance(u32),
+    /// Its depths are spread, and then comes [`Drive::end_epoch`].
+    Spread,
+    /// Nothing any more.
+    Done(StopReason),
+}
+
+/// The way of a search, step by step, for those who drive several at once; [`run`] goes it in one go.
 ///
-/// Rounds are alike in evals on every device, so it is the same round everywhere after which the budget is spent. Far from
-/// there all rounds are asked for at once, so that a device need not wait between them.
-fn advance(search: &mut dyn Search, budget: &Budget, observer: &mut dyn Observer) -> Result<()> {
-    let begun = search.standing();
-    let most = evals_per_round(search.course());
-    let rounds = (EVALS_PER_EPOCH / most.max(1)).clamp(1, u64::from(ROUNDS_PER_EPOCH)) as u32;
-    let is_near_the_end = budget.evals.saturating_sub(begun.evals) <= most * u64::from(rounds);
-    if !observer.looks_at_rounds() && !is_near_the_end {
-        search.advance(rounds)?;
-        return search.renormalise();
+/// Rounds are alike in evals on every device, so it is the same round everywhere after which the budget is spent.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    budget: Budget,
+    pace: Pace,
+    /// Where the objective had fallen by a thousandth for the last time.
+    mark: Standing,
+    idle_epochs: u32,
+    /// Evals when the epoch began.
+    begun_evals: u64,
+    /// Rounds left of the epoch that is under way, if one is.
+    rounds_left: Option<u32>,
+}
+
+impl Drive {
+    /// The way of a search that stands where it begins.
+    #[must_use]
+    pub fn new(search: &dyn Search, budget: Budget, pace: Pace) -> Self {
+        Self { budget, pace, mark: search.standing(), idle_epochs: 0, begun_evals: 0, rounds_left: None }
     }
-    for _ in 0..rounds {
-        search.advance(1)?;
-        if observer.looks_at_rounds() {
-            observer.after_round(search)?;
-        }
-        if search.standing().evals >= budget.evals {
-            break;
+
+    /// What the search does next, after it has done what was told before.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn next(&mut self, search: &mut dyn Search) -> Result<Next> {
+        let evals = search.standing().evals;
+        match self.rounds_left {
+            Some(left) if left == 0 || evals >= self.budget.evals => {
+                self.rounds_left = None;
+                Ok(Next::Spread)
+            }
+            Some(left) => {
+                self.rounds_left = Some(left - 1);
+                Ok(Next::Advance(1))
+            }
+            None => Ok(match spent(search, &self.budget, &mut self.mark)? {
+                Some(reason) => Next::Done(reason),
+                None => Next::Advance(self.begin_epoch(evals, evals_per_round(search.course()))),
+            }),
         }
     }
-    search.renormalise()
+
+    /// Begins an epoch; returns the rounds that are asked for first. Far from the end of the budget these are all.
+    fn begin_epoch(&mut self, evals: u64, evals_per_round: u64) -> u32 {
+        let rounds = (EVALS_PER_EPOCH / evals_per_round.max(1)).clamp(1, u64::from(ROUNDS_PER_EPOCH)) as u32;
+        let is_near_the_end = self.budget.evals.saturating_sub(evals) <= evals_per_round * u64::from(rounds);
+        let asked = if self.pace == Pace::Rounds || is_near_the_end { 1 } else { rounds };
+        self.begun_evals = evals;
+        self.rounds_left = Some(rounds - asked);
+        asked
+    }
+
+    /// Ends an epoch whose depths were spread; a reason if the search makes no child any more.
+    pub fn end_epoch(&mut self, standing: Standing) -> Option<StopReason> {
+        self.idle_epochs = if standing.evals == self.begun_evals { self.idle_epochs + 1 } else { 0 };
+        (self.idle_epochs == IDLE_EPOCHS_MAX).then_some(StopReason::Dry)
+    }
 }
 
 /// The most evals that a round can have: steps for each fly, and all candidates in each.

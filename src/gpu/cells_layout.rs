@@ -90,6 +90,18 @@ pub struct SearchRules {
     pub first_round_1: u32,
     pub first_round_2: u32,
     pub first_round_3: u32,
+    /// The colour behind all tiles, packed.
+    pub background: u32,
+    /// Where the lane lies in the buffers that all lanes share.
+    pub lane: u32,
+    pub first_fly: u32,
+    pub first_deal: u32,
+    pub first_cell: u32,
+    pub first_pixel: u32,
+    pub first_stack: u32,
+    pub first_scratch: u32,
+    pub first_guide: u32,
+    pub first_mask: u32,
 }
 
 /// `Header`: how far a search has come.
@@ -138,10 +150,12 @@ pub struct CellRecord {
     pub filled: u32,
 }
 
-/// `Push` of `glsl/cells.comp`.
+/// `Push` of all stages of the search.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct CellsPush {
+    /// Place of the first lane in the order of rules.
+    pub first_lane: u32,
     /// Most turns of loops in one invocation.
     pub budget: u32,
 }

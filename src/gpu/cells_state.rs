@@ -1,6 +1,7 @@
 //! The state of a cells search in the words that `glsl/shared/cells_state.glsl` explains: what the host writes and reads.
 
 use super::cells_layout::{FlyRecord, SearchRules};
+use super::cells_pools::{LaneSlices, Pool};
 use crate::error::{Error, Result};
 use crate::model::cells::glaze::opacity_of;
 use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
@@ -13,11 +14,10 @@ use crate::model::translucency::{CLEAR, Compositing};
 use crate::model::{Fly, NO_FLY};
 
 /// Pixels of a block.
-const BLOCK_PIXELS: usize = (BLOCK_SIDE_PX * BLOCK_SIDE_PX) as usize;
+pub(super) const BLOCK_PIXELS: usize = (BLOCK_SIDE_PX * BLOCK_SIDE_PX) as usize;
 /// Words of a pixel: two words of four.
 pub(super) const PIXEL_WORDS: usize = 8;
-/// The bits of a layer's third word that hold its depth; those above hold a pixel's weight less 1, and whether it wants no tile.
-const DEPTH_MASK: u32 = (1 << WEIGHT_SHIFT) - 1;
+/// In a pixel's third word its top fly's depth lies below its weight less 1, and whether it wants no tile.
 const WEIGHT_SHIFT: u32 = 25;
 const UNWANTED_SHIFT: u32 = 29;
 /// Flies are told by 28 bits in a candidate.
@@ -34,7 +34,7 @@ pub(super) struct Plan {
     /// Most cells of a round.
     pub cell_count: u32,
     /// Most flies on a pixel.
-    stack_depth: usize,
+    pub stack_depth: usize,
 }
 
 impl Plan {
@@ -54,9 +54,14 @@ impl Plan {
         }
     }
 
+    /// Blocks of 8x8 px.
+    pub fn block_count(&self) -> u64 {
+        u64::from(self.block_columns) * u64::from(self.block_rows)
+    }
+
     /// Pixels of all blocks.
     pub fn pixel_count(&self) -> usize {
-        self.block_columns as usize * self.block_rows as usize * BLOCK_PIXELS
+        self.block_count() as usize * BLOCK_PIXELS
     }
 
     /// Words of the stacks of all pixels: a fly and its error, or its look, for each place.
@@ -148,8 +153,10 @@ fn check_gains(course: &Course) -> Result<()> {
     Ok(())
 }
 
-/// The rules as the device reads them.
-pub(super) fn rules_record(course: &Course, plan: &Plan, scratch_words: u32) -> SearchRules {
+/// The rules of a lane as the device reads them.
+pub(super) fn rules_record(course: &Course, plan: &Plan, slices: &LaneSlices) -> SearchRules {
+    let first_stack = slices.first(Pool::Stacks).wrapping_mul(BLOCK_PIXELS as u32);
+    let first_pixel = slices.first(Pool::Blocks).wrapping_mul(BLOCK_PIXELS as u32);
     let Course { rules, guide, .. } = course;
     let mix = &rules.mix;
     let births = &rules.births;
@@ -162,7 +169,7 @@ pub(super) fn rules_record(course: &Course, plan: &Plan, scratch_words: u32) -> 
         columns: plan.block_columns,
         side_shift: plan.cell_side_px.trailing_zeros(),
         fly_count: course.fly_count as u32,
-        scratch_words,
+        scratch_words: (slices.of(Pool::Scratch).count / u64::from(plan.cell_count)) as u32,
         side: rules.side,
         candidates: rules.candidates,
         steps_per_fly: rules.steps_per_fly,
@@ -210,6 +217,16 @@ pub(super) fn rules_record(course: &Course, plan: &Plan, scratch_words: u32) -> 
         first_round_1: class(1).first_round,
         first_round_2: class(2).first_round,
         first_round_3: class(3).first_round,
+        background: rules.background,
+        lane: slices.first(Pool::Lanes),
+        first_fly: slices.first(Pool::Flies),
+        first_deal: slices.first(Pool::Flies).wrapping_mul(3),
+        first_cell: slices.first(Pool::Cells),
+        first_pixel,
+        first_stack: first_stack.wrapping_sub(first_pixel.wrapping_mul(plan.stack_depth as u32)),
+        first_scratch: slices.first(Pool::Scratch),
+        first_guide: slices.first(Pool::Guide),
+        first_mask: slices.first(Pool::Masks),
     }
 }
 
@@ -246,43 +263,63 @@ impl FlyRecord {
     }
 }
 
+/// The words of all pixels on which no fly lies, and what the objective is then.
+pub(super) fn bare_words(course: &Course, plan: &Plan) -> (Vec<u32>, i64) {
+    let mut pixels = vec![0; plan.pixel_count() * PIXEL_WORDS];
+    let mut objective = 0;
+    for (place, number) in plan.places().zip(0..) {
+        let words = pixel_words(course, number, &[], &[]);
+        pixels[place * PIXEL_WORDS..(place + 1) * PIXEL_WORDS].copy_from_slice(&words);
+        objective += i64::from(words[3]);
+        if !course.is_translucent() {
+            objective -= i64::from(course.rules.penalties.overlap);
+        }
+    }
+    (pixels, objective)
+}
+
 /// The words of all pixels, and of all stacks, of a population in its stacks.
-pub(super) fn pixel_words(course: &Course, plan: &Plan, flies: &[Fly], stacks: &Stacks) -> (Vec<u32>, Vec<u32>) {
+pub(super) fn state_words(course: &Course, plan: &Plan, flies: &[Fly], stacks: &Stacks) -> (Vec<u32>, Vec<u32>) {
     let mut pixels = vec![0; plan.pixel_count() * PIXEL_WORDS];
     let mut words = vec![0; plan.stack_words()];
-    let Course { rules, target, .. } = course;
-    let is_translucent = course.is_translucent();
     for ((place, stack), number) in plan.places().zip(&stacks.pixels).zip(0..) {
-        let color = pack(target.pixels()[number]);
-        let weight = target.weights().map_or(1, |weights| u32::from(weights[number]));
-        let is_unwanted = target.transparent().is_some_and(|transparent| transparent[number]);
-        let bare = difference(color, rules.background) * weight as i32 + rules.penalties.hole as i32;
-        let ground = if is_unwanted { 0 } else { bare } + rules.penalties.overlap as i32;
-        let layer = |nth: usize| {
-            stack.get(nth).map_or((NO_FLY, BACKGROUND_Z, ground), |&(fly, error)| (fly, flies[fly as usize].z, error))
-        };
-        let ((top, top_z, mut top_error), mut behind) = (layer(0), layer(1));
-        if is_translucent {
-            top_error = glazed_error(stack, (color, is_unwanted), rules.background) * weight as i32;
-            behind = (NO_FLY, BACKGROUND_Z, 0);
-        }
-        let (under, under_z, under_error) = behind;
-        pixels[place * PIXEL_WORDS..(place + 1) * PIXEL_WORDS].copy_from_slice(&[
-            color | (stack.len() as u32) << 24,
-            top,
-            top_z | (weight - 1) << WEIGHT_SHIFT | u32::from(is_unwanted) << UNWANTED_SHIFT,
-            top_error as u32,
-            under,
-            under_z,
-            under_error as u32,
-            ground as u32,
-        ]);
+        let pixel = pixel_words(course, number, flies, stack);
+        pixels[place * PIXEL_WORDS..(place + 1) * PIXEL_WORDS].copy_from_slice(&pixel);
         for (entry, &(fly, error)) in stack.iter().enumerate() {
             let word = plan.stack_word(place, entry);
             words[word..word + 2].copy_from_slice(&[fly, error as u32]);
         }
     }
     (pixels, words)
+}
+
+/// The words of a pixel of the target under a stack of flies.
+fn pixel_words(course: &Course, number: usize, flies: &[Fly], stack: &[(u32, i32)]) -> [u32; PIXEL_WORDS] {
+    let Course { rules, target, .. } = course;
+    let color = pack(target.pixels()[number]);
+    let weight = target.weights().map_or(1, |weights| u32::from(weights[number]));
+    let is_unwanted = target.transparent().is_some_and(|transparent| transparent[number]);
+    let bare = difference(color, rules.background) * weight as i32 + rules.penalties.hole as i32;
+    let ground = if is_unwanted { 0 } else { bare } + rules.penalties.overlap as i32;
+    let layer = |nth: usize| {
+        stack.get(nth).map_or((NO_FLY, BACKGROUND_Z, ground), |&(fly, error)| (fly, flies[fly as usize].z, error))
+    };
+    let ((top, top_z, mut top_error), mut behind) = (layer(0), layer(1));
+    if course.is_translucent() {
+        top_error = glazed_error(stack, (color, is_unwanted), rules.background) * weight as i32;
+        behind = (NO_FLY, BACKGROUND_Z, 0);
+    }
+    let (under, under_z, under_error) = behind;
+    [
+        color | (stack.len() as u32) << 24,
+        top,
+        top_z | (weight - 1) << WEIGHT_SHIFT | u32::from(is_unwanted) << UNWANTED_SHIFT,
+        top_error as u32,
+        under,
+        under_z,
+        under_error as u32,
+        ground as u32,
+    ]
 }
 
 /// Error of a pixel of this target under translucent tiles of these looks.
@@ -308,15 +345,4 @@ pub(super) fn stacks(plan: &Plan, pixels: &[u32], words: &[u32]) -> Stacks {
             .collect()
     };
     Stacks { pixels: plan.places().map(stack_at).collect() }
-}
-
-/// Gives the layers of all pixels the depths of their flies.
-pub(super) fn set_depths(pixels: &mut [u32], flies: &[FlyRecord]) {
-    for pixel in pixels.chunks_exact_mut(PIXEL_WORDS) {
-        for layer in [1, 4] {
-            if let Some(fly) = flies.get(pixel[layer] as usize) {
-                pixel[layer + 1] = pixel[layer + 1] & !DEPTH_MASK | fly.z;
-            }
-        }
-    }
 }

@@ -1,13 +1,13 @@
-//! The compute pass `evaluate`: its pipeline, and the buffers that all lanes share. Twin: `cpu/evaluate.rs`.
+//! The compute pass `evaluate`: its pipelines, and the work of a dispatch. Twin: `cpu/evaluate.rs`.
 
 use std::sync::Arc;
 
-use super::layout::{EvaluatePush, LaneRecord, Tile, WorkItem};
+use super::lane_buffers::{LaneBuffers, Room};
+use super::layout::{EvaluatePush, FLAG_CONTINUED, FLAG_UNFINISHED, WorkItem};
 use super::shaders;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::model::mask::{TEXELS, Texel};
-use crate::model::tile::pack;
-use crate::model::{Lane, MaskSet};
+use crate::model::{Blend, MaskSet, Scene};
 use crate::vk::{
     Binding, BindingGroup, BindingKind, Buffer, BufferUse, ComputePass, ComputePipeline, ComputeShader, Device,
     DeviceKind, Recorder, Residence,
@@ -56,32 +56,29 @@ impl KernelShape {
 pub(super) struct Variant {
     pub shape: KernelShape,
     pub mode: Mode,
-    /// Whether any lane has masks besides the square.
+    /// Whether any opaque lane has masks besides the square.
     pub masked: bool,
-    /// Whether any sum may not fit 32 bits.
+    /// Whether any sum of an opaque lane may not fit 32 bits.
     pub wide_sums: bool,
+    /// Whether any list is looked at in pieces.
+    pub pieces: bool,
 }
 
 impl Variant {
-    /// The leanest variant that is right for these lanes.
-    fn for_lanes(lanes: &[Lane], shape: KernelShape) -> Self {
-        /// A pixel adds at most 3 * 255 to a sum.
-        const NARROW_PIXELS: u64 = (1 << 31) / 765;
-        let pixels = |lane: &Lane| {
-            let target = &lane.scene().target;
-            u64::from(target.width_px()) * u64::from(target.height_px())
-        };
-        Self {
-            shape,
-            mode: Mode::Evaluate,
-            masked: lanes.iter().any(|lane| lane.scene().masks.layers().len() > 1),
-            wide_sums: lanes.iter().any(|lane| pixels(lane) > NARROW_PIXELS),
-        }
+    /// The leanest variant that is right for lanes of these scenes.
+    fn for_scenes<'a>(scenes: impl Iterator<Item = &'a Scene>, shape: KernelShape) -> Self {
+        let lean = Self { shape, mode: Mode::Evaluate, masked: false, wide_sums: false, pieces: false };
+        scenes.filter(|scene| scene.masks.blend() == Blend::Opaque).fold(lean, |variant, scene| Self {
+            masked: variant.masked || scene.masks.layers().len() > 1,
+            wide_sums: variant.wide_sums || needs_wide_sums(scene),
+            ..variant
+        })
     }
 
-    fn specialization(self) -> [(u32, u32); 6] {
+    fn specialization(self) -> [(u32, u32); 7] {
         let [threads, side, pixels] = self.shape.specialization();
-        [threads, side, pixels, (3, self.mode as u32), (4, u32::from(self.masked)), (5, u32::from(self.wide_sums))]
+        let [masked, wide_sums, pieces] = [self.masked, self.wide_sums, self.pieces].map(u32::from);
+        [threads, side, pixels, (3, self.mode as u32), (4, masked), (5, wide_sums), (6, pieces)]
     }
 }
 
@@ -94,78 +91,64 @@ pub(super) enum Mode {
     ReRender = 1,
 }
 
-/// Where a lane lies in the shared buffers.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct LaneSpan {
-    pub first_fly: usize,
-    pub fly_count: usize,
-    pub first_pixel: usize,
-    pub pixel_count: usize,
+/// Whether sums of a lane may not fit 32 bits. If they do, their high words mean nothing.
+pub(super) fn needs_wide_sums(scene: &Scene) -> bool {
+    /// A pixel adds at most 3 * 255 to a sum.
+    const NARROW_PIXELS: u64 = (1 << 31) / 765;
+    u64::from(scene.target.width_px()) * u64::from(scene.target.height_px()) > NARROW_PIXELS
 }
 
-/// Pipeline and buffers of the pass.
+/// Pipelines of the pass, the buffers of all lanes, and those of the work.
 pub(super) struct EvaluatePass {
     pub variant: Variant,
-    pub spans: Vec<LaneSpan>,
-    pub tiles: Arc<Buffer>,
-    pub top: Arc<Buffer>,
-    pub under: Arc<Buffer>,
-    pub marginal: Arc<Buffer>,
-    pub sums: Arc<Buffer>,
-    pub lanes: Arc<Buffer>,
-    pub targets: Arc<Buffer>,
-    pub masks: Arc<Buffer>,
+    pub buffers: LaneBuffers,
     work: Arc<Buffer>,
     entries: Arc<Buffer>,
-    parts: Arc<Buffer>,
-    pipeline: Arc<ComputePipeline>,
-    group: Arc<BindingGroup>,
-    workgroups_per_row: u32,
+    /// Each variant is made once, when it is first needed.
+    pipelines: Vec<(Variant, Arc<ComputePipeline>)>,
+    /// What is bound, and [`LaneBuffers::version`] when it was.
+    group: Option<(usize, Arc<BindingGroup>)>,
+    device: Arc<Device>,
 }
 
 impl EvaluatePass {
-    /// Creates the buffers for these lanes and uploads what never changes: lane records, targets and masks.
-    pub fn create(device: &Arc<Device>, recorder: &mut Recorder, lanes: &[Lane], shape: KernelShape) -> Result<Self> {
-        let spans = spans(lanes, shape);
-        let fly_count: usize = spans.iter().map(|span| span.fly_count).sum();
-        let pixel_count: usize = spans.iter().map(|span| span.pixel_count).sum();
-        if u32::try_from(pixel_count).is_err() {
-            return Err(Error::TooLarge(format!(
-                "{pixel_count} pixels are more than one Vulkan device evaluates at once; use a smaller --size, or --device cpu"
-            )));
-        }
-        let buffers = create_buffers(device, lanes.len(), fly_count, pixel_count, shape)?;
-        let masks = create_mask_buffer(device, recorder, lanes.iter().map(|lane| &*lane.scene().masks))?;
-        let variant = Variant::for_lanes(lanes, shape);
-        let pipeline = create_pipeline(device, variant)?;
-        let group = bind(&pipeline, &buffers, &masks)?;
-        let [lane_records, work, entries, tiles, targets, top, under, parts, marginal, sums] = buffers;
-        upload_lanes(recorder, &lane_records, lanes, &spans)?;
-        for (lane, span) in lanes.iter().zip(&spans) {
-            recorder.write_buffer(
-                &targets,
-                span.first_pixel as u64 * 4,
-                bytemuck::cast_slice(&lane.blocked_target()),
-            )?;
-        }
+    /// Creates buffers without lanes, with so much room.
+    pub fn create(device: &Arc<Device>, room: Room, shape: KernelShape) -> Result<Self> {
+        let (item_count, entry_count) = work_sizes(room, shape);
         Ok(Self {
-            variant,
-            spans,
-            tiles,
-            top,
-            under,
-            marginal,
-            sums,
-            lanes: lane_records,
-            work,
-            entries,
-            targets,
-            parts,
-            masks,
-            pipeline,
-            group,
-            workgroups_per_row: device.info().limits.workgroups[0],
+            variant: Variant::for_scenes(std::iter::empty(), shape),
+            buffers: LaneBuffers::create(device, room)?,
+            work: storage(device, "work", item_count * size_of::<WorkItem>())?,
+            entries: storage(device, "entries", entry_count * 4)?,
+            pipelines: Vec::new(),
+            group: None,
+            device: Arc::clone(device),
         })
+    }
+
+    /// Has room for the work of lanes that need `room` together, as far as a buffer may be that large: else work takes several
+    /// submissions.
+    pub fn make_room_for_work(&mut self, room: Room) -> Result<()> {
+        let (items, entries) = work_sizes(room, self.variant.shape);
+        if items <= self.item_capacity() && entries <= self.entry_capacity() {
+            return Ok(());
+        }
+        let larger = |needed: usize, capacity: usize, bytes: usize| {
+            let limit = self.device.info().limits.storage_buffer_bytes as usize / bytes;
+            if needed <= capacity { capacity } else { needed.max(2 * capacity).min(limit) }
+        };
+        let items = larger(items, self.item_capacity(), size_of::<WorkItem>());
+        let entries = larger(entries, self.entry_capacity(), 4);
+        let work = storage(&self.device, "work", items * size_of::<WorkItem>())?;
+        self.entries = storage(&self.device, "entries", entries * 4)?;
+        self.work = work;
+        self.group = None;
+        Ok(())
+    }
+
+    /// From now on the lanes are those of these scenes.
+    pub fn choose_variant<'a>(&mut self, scenes: impl Iterator<Item = &'a Scene>) {
+        self.variant = Variant::for_scenes(scenes, self.variant.shape);
     }
 
     /// Work items that fit one dispatch.
@@ -178,18 +161,33 @@ impl EvaluatePass {
         self.entries.size_bytes() as usize / 4
     }
 
-    /// Uploads work items and their lists for the next dispatch.
-    pub fn write_work(&self, recorder: &mut Recorder, items: &[WorkItem], entries: &[u32]) -> Result<()> {
+    /// Uploads work items and their lists, and records their dispatch.
+    pub fn record(&mut self, recorder: &mut Recorder, items: &[WorkItem], entries: &[u32]) -> Result<()> {
         recorder.write_buffer(&self.work, 0, bytemuck::cast_slice(items))?;
-        recorder.write_buffer(&self.entries, 0, bytemuck::cast_slice(entries))
+        recorder.write_buffer(&self.entries, 0, bytemuck::cast_slice(entries))?;
+        let pieces = items.iter().any(|item| item.flags & (FLAG_CONTINUED | FLAG_UNFINISHED) != 0);
+        let pipeline = self.pipeline(Variant { pieces, ..self.variant })?;
+        let group = match &self.group {
+            Some((version, group)) if *version == self.buffers.version() => Arc::clone(group),
+            _ => {
+                let group = self.bind_with_sums(&pipeline, self.buffers.sums())?;
+                self.group = Some((self.buffers.version(), Arc::clone(&group)));
+                group
+            }
+        };
+        let mut pass = recorder.compute_pass("evaluate")?;
+        let push = EvaluatePush { item_count: items.len() as u32, left_out_fly: u32::MAX, sum_offset: 0 };
+        self.dispatch(&mut pass, &pipeline, &group, push);
+        Ok(())
     }
 
-    /// Records the dispatch of `item_count` work items.
-    pub fn record(&self, recorder: &mut Recorder, item_count: usize) -> Result<()> {
-        let mut pass = recorder.compute_pass("evaluate")?;
-        let push = EvaluatePush { item_count: item_count as u32, left_out_fly: u32::MAX, sum_offset: 0 };
-        self.dispatch(&mut pass, &self.pipeline, &self.group, push);
-        Ok(())
+    fn pipeline(&mut self, variant: Variant) -> Result<Arc<ComputePipeline>> {
+        if let Some((_, pipeline)) = self.pipelines.iter().find(|(of, _)| *of == variant) {
+            return Ok(Arc::clone(pipeline));
+        }
+        let pipeline = create_pipeline(&self.device, variant)?;
+        self.pipelines.push((variant, Arc::clone(&pipeline)));
+        Ok(pipeline)
     }
 
     /// Dispatches one workgroup per work item with any kernel that has this pass's bindings.
@@ -202,43 +200,30 @@ impl EvaluatePass {
     ) {
         pass.bind(pipeline, group);
         pass.push_constants(bytemuck::bytes_of(&push));
-        let columns = push.item_count.min(self.workgroups_per_row);
+        let columns = push.item_count.min(self.device.info().limits.workgroups[0]);
         pass.dispatch(columns, push.item_count.div_ceil(columns), 1);
     }
 
-    /// This pass's bindings with other sums.
+    /// This pass's bindings with these sums.
     pub fn bind_with_sums(&self, pipeline: &ComputePipeline, sums: &Arc<Buffer>) -> Result<Arc<BindingGroup>> {
-        let Self { lanes, work, entries, tiles, targets, top, under, parts, marginal, masks, .. } = self;
-        let buffers = [lanes, work, entries, tiles, targets, top, under, parts, marginal, sums].map(Arc::clone);
-        bind(pipeline, &buffers, masks)
+        let (lanes, flies, pixels) = (self.buffers.lanes(), self.buffers.flies(), self.buffers.pixels());
+        let [tiles, marginal] = flies;
+        let [targets, top, under, parts] = pixels;
+        let masks = self.buffers.masks();
+        let buffers = [lanes, &self.work, &self.entries, tiles, targets, top, under, parts, marginal, sums, masks];
+        BindingGroup::create("evaluate", pipeline.layout(), &buffers.map(Binding::Buffer))
     }
 }
 
-/// The storage buffers, in the order of their bindings.
-fn create_buffers(
-    device: &Arc<Device>,
-    lane_count: usize,
-    fly_count: usize,
-    pixel_count: usize,
-    shape: KernelShape,
-) -> Result<[Arc<Buffer>; 10]> {
-    let block_count = pixel_count / shape.block_pixels();
-    // Room for the lists of a whole population of ordinary depth; longer work takes several submissions.
-    let entry_count = (16 * fly_count + 8 * block_count).clamp(1 << 16, 1 << 22);
-    let storage =
-        |name: &str, bytes: usize| Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device);
-    Ok([
-        storage("lanes", lane_count * size_of::<LaneRecord>())?,
-        storage("work", block_count * size_of::<WorkItem>())?,
-        storage("entries", entry_count * 4)?,
-        storage("tiles", fly_count * size_of::<Tile>())?,
-        storage("targets", pixel_count * 4)?,
-        storage("top layer", pixel_count * 4)?,
-        storage("under layer", pixel_count * 4)?,
-        storage("parts", pixel_count * 4)?,
-        storage("marginal fitness", fly_count * 8)?,
-        storage("sums", lane_count * 8)?,
-    ])
+/// Items and list entries of a dispatch that evaluates whole populations of ordinary depth; longer work takes several
+/// submissions.
+fn work_sizes(room: Room, shape: KernelShape) -> (usize, usize) {
+    let block_count = room.pixels / shape.block_pixels();
+    (block_count, (16 * room.flies + 8 * block_count).clamp(1 << 16, 1 << 22))
+}
+
+fn storage(device: &Arc<Device>, name: &str, bytes: usize) -> Result<Arc<Buffer>> {
+    Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
 }
 
 /// The kernel in one of its variants.
@@ -268,34 +253,4 @@ pub(super) fn create_mask_buffer<'a>(
         recorder.write_buffer(&buffer, layer * layer_bytes, bytemuck::cast_slice(mask.texels()))?;
     }
     Ok(buffer)
-}
-
-fn bind(pipeline: &ComputePipeline, buffers: &[Arc<Buffer>; 10], masks: &Arc<Buffer>) -> Result<Arc<BindingGroup>> {
-    let mut bindings: Vec<Binding<'_>> = buffers.iter().map(Binding::Buffer).collect();
-    bindings.push(Binding::Buffer(masks));
-    BindingGroup::create("evaluate", pipeline.layout(), &bindings)
-}
-
-fn spans(lanes: &[Lane], shape: KernelShape) -> Vec<LaneSpan> {
-    let (mut first_fly, mut first_pixel) = (0, 0);
-    let span = |lane: &Lane| {
-        let (fly_count, pixel_count) = (lane.tiles().len(), lane.lists().block_count() * shape.block_pixels());
-        let span = LaneSpan { first_fly, fly_count, first_pixel, pixel_count };
-        first_fly += fly_count;
-        first_pixel += pixel_count;
-        span
-    };
-    lanes.iter().map(span).collect()
-}
-
-fn upload_lanes(recorder: &mut Recorder, buffer: &Arc<Buffer>, lanes: &[Lane], spans: &[LaneSpan]) -> Result<()> {
-    let mut first_mask = 0;
-    let record = |(sum, (lane, span)): (u32, (&Lane, &LaneSpan))| {
-        let background = pack(lane.scene().background);
-        let record = LaneRecord { first_fly: span.first_fly as u32, first_mask, background, sum };
-        first_mask += lane.scene().masks.layers().len() as u32;
-        record
-    };
-    let records: Vec<LaneRecord> = (0..).zip(lanes.iter().zip(spans)).map(record).collect();
-    recorder.write_buffer(buffer, 0, bytemuck::cast_slice(&records))
 }

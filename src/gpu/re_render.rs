@@ -3,6 +3,7 @@
 
 use super::GpuEvaluator;
 use super::evaluate_pass::{Mode, Variant, create_pipeline};
+use super::evaluator::GpuLane;
 use super::layout::EvaluatePush;
 use crate::error::{Error, Result};
 use crate::model::Evaluator;
@@ -17,7 +18,7 @@ impl GpuEvaluator {
     /// # Errors
     /// [`Error::Usage`] unless there is one lane, whose lists fit a single dispatch; or if the device fails.
     pub fn marginal_by_re_rendering(&mut self) -> Result<Vec<i64>> {
-        let [lane] = &self.lanes[..] else {
+        let [Some(GpuLane { lane, .. })] = &self.lanes[..] else {
             return Err(Error::Usage("re-rendering works on one lane".to_owned()));
         };
         let lists = lane.lists();

@@ -21,6 +21,8 @@ pub(super) const CELLS_DEAL: &[u8] = include_bytes!("../../spirv/cells_deal.comp
 pub(super) const CELLS_SCAN: &[u8] = include_bytes!("../../spirv/cells_scan.comp.spv");
 /// Members into their slices.
 pub(super) const CELLS_SCATTER: &[u8] = include_bytes!("../../spirv/cells_scatter.comp.spv");
+/// Twin: `renormalise` in `cpu/cells/mod.rs`.
+pub(super) const CELLS_DEPTHS: &[u8] = include_bytes!("../../spirv/cells_depths.comp.spv");
 /// Slices in the order of the flies.
 pub(super) const CELLS_SORT: &[u8] = include_bytes!("../../spirv/cells_sort.comp.spv");
 

@@ -6,7 +6,8 @@
 
 use std::sync::Arc;
 
-use super::evaluate_pass::{EvaluatePass, KernelShape, LIST_PIECE};
+use super::evaluate_pass::{KernelShape, LIST_PIECE};
+use super::lane_buffers::LaneBuffers;
 use super::layout::{FLAG_CONTINUED, FLAG_UNFINISHED, StackItem, TranslucentPush};
 use super::shaders;
 use crate::error::Result;
@@ -58,83 +59,138 @@ struct Batch {
     part_count: usize,
 }
 
-/// Pipeline, buffers and sums of the translucent lanes.
-pub(super) struct TranslucentPass {
-    pixels_per_thread: usize,
-    block_pixels: usize,
-    ledgers: Vec<Ledger>,
-    batch: Batch,
+/// Words in the buffers of the pass, and items in that of the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Sizes {
+    items: usize,
+    entries: usize,
+    scratch: usize,
+    parts: usize,
+}
+
+impl Sizes {
+    /// Room for lanes with so many blocks together, none of which has more than `fly_count` flies. Whatever a population
+    /// does, a block fits: then nothing is ever refused.
+    fn of(block_count: usize, fly_count: usize, block_pixels: usize) -> Self {
+        let entries = (24 * block_count).clamp(1 << 16, 1 << 22).max(fly_count + 1);
+        Self {
+            items: block_count.max(8_192),
+            entries,
+            scratch: SCRATCH_WORDS.max(scratch_words(fly_count, block_pixels)),
+            parts: entries + block_count,
+        }
+    }
+
+    fn max(self, other: Self) -> Self {
+        Self {
+            items: self.items.max(other.items),
+            entries: self.entries.max(other.entries),
+            scratch: self.scratch.max(other.scratch),
+            parts: self.parts.max(other.parts),
+        }
+    }
+}
+
+/// What the translucent lanes share.
+struct Buffers {
+    sizes: Sizes,
     work: Arc<Buffer>,
     entries: Arc<Buffer>,
     scratch: Arc<Buffer>,
     parts: Arc<Buffer>,
+}
+
+impl Buffers {
+    fn create(device: &Arc<Device>, sizes: Sizes) -> Result<Self> {
+        let storage = |name: &str, words: usize| {
+            Buffer::create(device, name, words as u64 * 4, BufferUse::Storage, Residence::Device)
+        };
+        Ok(Self {
+            sizes,
+            work: storage("translucent work", sizes.items * size_of::<StackItem>() / 4)?,
+            entries: storage("translucent entries", sizes.entries)?,
+            scratch: storage("translucent scratch", sizes.scratch)?,
+            parts: storage("translucent parts", sizes.parts)?,
+        })
+    }
+}
+
+/// Pipeline, buffers and sums of the translucent lanes.
+pub(super) struct TranslucentPass {
+    pixels_per_thread: usize,
+    block_pixels: usize,
+    /// By the number of the lane.
+    ledgers: Vec<Option<Ledger>>,
+    batch: Batch,
+    buffers: Buffers,
     pipeline: Arc<ComputePipeline>,
-    group: Arc<BindingGroup>,
+    /// What is bound, and [`LaneBuffers::version`] when it was.
+    group: Option<(usize, Arc<BindingGroup>)>,
     workgroups_per_row: usize,
 }
 
 impl TranslucentPass {
-    /// Creates the pass for lanes whose shared data are in `shared`.
-    pub fn create(device: &Arc<Device>, shared: &EvaluatePass, lanes: &[Lane]) -> Result<Self> {
-        let shape = shared.variant.shape;
+    /// Creates the pass for lanes with so many blocks together, none of which has more than `fly_count` flies.
+    pub fn create(device: &Arc<Device>, shape: KernelShape, (block_count, fly_count): (usize, usize)) -> Result<Self> {
         // With more, the deepest stacks would need more turns of a loop than there may be.
         let shape = KernelShape { pixels_per_thread: shape.pixels_per_thread.min(8), ..shape };
-        let block_pixels = shared.variant.shape.block_pixels();
-        let block_count: usize = lanes.iter().map(|lane| lane.lists().block_count()).sum();
-        let fly_count = lanes.iter().map(|lane| lane.tiles().len()).max().unwrap_or(0);
-        // Whatever a population does, a block fits: then nothing is ever refused.
-        let entry_count = (24 * block_count).clamp(1 << 16, 1 << 22).max(fly_count + 1);
-        let item_count = block_count.max(8_192);
-        let scratch_words = SCRATCH_WORDS.max(scratch_words(fly_count, block_pixels));
-        let storage = |name: &str, words: usize| {
-            Buffer::create(device, name, words as u64 * 4, BufferUse::Storage, Residence::Device)
-        };
-        let work = storage("translucent work", item_count * size_of::<StackItem>() / 4)?;
-        let entries = storage("translucent entries", entry_count)?;
-        let scratch = storage("translucent scratch", scratch_words)?;
-        let parts = storage("translucent parts", entry_count + block_count)?;
-        let pipeline = create_pipeline(device, shape)?;
-        let group = {
-            let EvaluatePass { lanes, tiles, targets, top, under, masks, .. } = shared;
-            let buffers = [lanes, &work, &entries, tiles, targets, top, under, &scratch, &parts, masks];
-            let bindings = buffers.map(Binding::Buffer);
-            BindingGroup::create("translucent", pipeline.layout(), &bindings)?
-        };
-        let ledger = |lane: &Lane| Ledger {
-            tally: Tally::new(lane.tiles().len()),
-            blocks: vec![BlockParts::default(); lane.lists().block_count()],
-        };
+        let block_pixels = shape.block_pixels();
         Ok(Self {
             pixels_per_thread: shape.pixels_per_thread as usize,
             block_pixels,
-            ledgers: lanes.iter().map(ledger).collect(),
+            ledgers: Vec::new(),
             batch: Batch::default(),
-            work,
-            entries,
-            scratch,
-            parts,
-            pipeline,
-            group,
+            buffers: Buffers::create(device, Sizes::of(block_count, fly_count, block_pixels))?,
+            pipeline: create_pipeline(device, shape)?,
+            group: None,
             workgroups_per_row: device.info().limits.workgroups[0] as usize,
         })
     }
 
+    /// Has room for the work of lanes with so many blocks together, none of which has more than `fly_count` flies.
+    pub fn make_room(&mut self, device: &Arc<Device>, block_count: usize, fly_count: usize) -> Result<()> {
+        let sizes = |blocks, flies| self.buffers.sizes.max(Sizes::of(blocks, flies, self.block_pixels));
+        if sizes(block_count, fly_count) != self.buffers.sizes {
+            // Twice as much now and then, not a little more with each lane.
+            let sizes = sizes(block_count.next_power_of_two(), fly_count.next_power_of_two());
+            self.buffers = Buffers::create(device, sizes)?;
+            self.group = None;
+        }
+        Ok(())
+    }
+
+    /// Begins to keep the sums of a lane.
+    pub fn admit(&mut self, number: usize, lane: &Lane) {
+        if self.ledgers.len() <= number {
+            self.ledgers.resize_with(number + 1, || None);
+        }
+        self.ledgers[number] = Some(Ledger {
+            tally: Tally::new(lane.tiles().len()),
+            blocks: vec![BlockParts::default(); lane.lists().block_count()],
+        });
+    }
+
+    /// Forgets the sums of a lane, if it is a translucent one.
+    pub fn release(&mut self, number: usize) {
+        if let Some(ledger) = self.ledgers.get_mut(number) {
+            *ledger = None;
+        }
+    }
+
     /// Fitness of a translucent lane.
     pub fn evaluation(&self, lane: usize) -> Evaluation<'_> {
-        self.ledgers[lane].tally.evaluation()
+        self.ledgers[lane].as_ref().expect("the lane is translucent").tally.evaluation()
     }
 
     /// Whether a block with a list of `length` still fits the buffers together with the batch so far. An empty batch has
     /// room for any block.
     pub fn has_room(&self, length: usize) -> bool {
-        let words = |buffer: &Buffer| buffer.size_bytes() as usize / 4;
-        let batch = &self.batch;
-        let item_capacity = self.work.size_bytes() as usize / size_of::<StackItem>();
+        let (batch, sizes) = (&self.batch, self.buffers.sizes);
         batch.blocks.is_empty()
-            || (batch.entries.len() + length <= words(&self.entries)
-                && batch.part_count + length < words(&self.parts)
-                && batch.scratch_words + scratch_words(length, self.block_pixels) <= words(&self.scratch)
-                && batch.item_count + plan(length, self.pixels_per_thread).len() <= item_capacity)
+            || (batch.entries.len() + length <= sizes.entries
+                && batch.part_count + length < sizes.parts
+                && batch.scratch_words + scratch_words(length, self.block_pixels) <= sizes.scratch
+                && batch.item_count + plan(length, self.pixels_per_thread).len() <= sizes.items)
     }
 
     /// Adds the evaluation of a block, whose first pixel has the number `first_pixel` in the layers, to the batch.
@@ -179,32 +235,48 @@ impl TranslucentPass {
     }
 
     /// Records the batch, submitting in between if it is much work, and asks for its parts.
-    pub fn record(&self, recorder: &mut Recorder) -> Result<Option<ReadTicket>> {
-        let batch = &self.batch;
+    pub fn record(&mut self, recorder: &mut Recorder, lanes: &LaneBuffers) -> Result<Option<ReadTicket>> {
+        let group = self.bind(lanes)?;
+        let (batch, buffers) = (&self.batch, &self.buffers);
         if batch.blocks.is_empty() {
             return Ok(None);
         }
         let items: Vec<StackItem> = batch.rounds.iter().flatten().map(|(item, _)| *item).collect();
-        recorder.write_buffer(&self.work, 0, bytemuck::cast_slice(&items))?;
-        recorder.write_buffer(&self.entries, 0, bytemuck::cast_slice(&batch.entries))?;
+        recorder.write_buffer(&buffers.work, 0, bytemuck::cast_slice(&items))?;
+        recorder.write_buffer(&buffers.entries, 0, bytemuck::cast_slice(&batch.entries))?;
         let part_bytes = batch.part_count as u64 * 4;
-        recorder.transfer_pass("zero parts")?.fill(&self.parts, 0, part_bytes, 0);
+        recorder.transfer_pass("zero parts")?.fill(&buffers.parts, 0, part_bytes, 0);
         let (mut first, mut turns) = (0, 0);
         for round in &batch.rounds {
             let mut end = first;
             for &(_, item_turns) in round {
                 if turns + item_turns > TURNS_PER_SUBMISSION {
-                    self.dispatch(recorder, first..end)?;
+                    self.dispatch(recorder, &group, first..end)?;
                     recorder.submit_and_wait()?;
                     (first, turns) = (end, 0);
                 }
                 turns += item_turns;
                 end += 1;
             }
-            self.dispatch(recorder, first..end)?;
+            self.dispatch(recorder, &group, first..end)?;
             first = end;
         }
-        recorder.read_buffer(&self.parts, 0, part_bytes).map(Some)
+        recorder.read_buffer(&buffers.parts, 0, part_bytes).map(Some)
+    }
+
+    /// What the kernel works on.
+    fn bind(&mut self, lanes: &LaneBuffers) -> Result<Arc<BindingGroup>> {
+        if let Some((version, group)) = &self.group
+            && *version == lanes.version()
+        {
+            return Ok(Arc::clone(group));
+        }
+        let Buffers { work, entries, scratch, parts, .. } = &self.buffers;
+        let ([tiles, _], [targets, top, under, _]) = (lanes.flies(), lanes.pixels());
+        let buffers = [lanes.lanes(), work, entries, tiles, targets, top, under, scratch, parts, lanes.masks()];
+        let group = BindingGroup::create("translucent", self.pipeline.layout(), &buffers.map(Binding::Buffer))?;
+        self.group = Some((lanes.version(), Arc::clone(&group)));
+        Ok(group)
     }
 
     /// Takes the parts of the batch that [`TranslucentPass::record`] asked for into the sums, and empties it.
@@ -213,7 +285,7 @@ impl TranslucentPass {
         recorder.read_into(ticket, bytemuck::cast_slice_mut(&mut parts))?;
         for BatchBlock { lane, block, entries, first_part } in &self.batch.blocks {
             let (marginal, error) = parts[*first_part..].split_at(entries.len());
-            let Ledger { tally, blocks } = &mut self.ledgers[*lane];
+            let Some(Ledger { tally, blocks }) = &mut self.ledgers[*lane] else { continue };
             let sums = &mut blocks[*block as usize];
             tally.subtract(sums);
             sums.set(self.batch.entries[entries.clone()].iter().copied(), marginal, error[0] as u32);
@@ -224,12 +296,17 @@ impl TranslucentPass {
     }
 
     /// Records a dispatch of some items of the batch, after what was recorded before it.
-    fn dispatch(&self, recorder: &mut Recorder, items: std::ops::Range<usize>) -> Result<()> {
+    fn dispatch(
+        &self,
+        recorder: &mut Recorder,
+        group: &Arc<BindingGroup>,
+        items: std::ops::Range<usize>,
+    ) -> Result<()> {
         if items.is_empty() {
             return Ok(());
         }
         let mut pass = recorder.compute_pass("translucent")?;
-        pass.bind(&self.pipeline, &self.group);
+        pass.bind(&self.pipeline, group);
         let push = TranslucentPush { first_item: items.start as u32, item_count: items.len() as u32 };
         pass.push_constants(bytemuck::bytes_of(&push));
         let columns = items.len().min(self.workgroups_per_row);

@@ -45,6 +45,9 @@ pub struct Layers {
 /// Every implementation gives the same numbers and the same pixels.
 pub trait Evaluator: Send {
     /// What the host keeps of `lane`: its scene, and the tiles and block lists of the loaded population.
+    ///
+    /// # Panics
+    /// If there is no such lane, here and wherever one is named.
     fn lane(&self, lane: usize) -> &Lane;
 
     /// What stays the same while `lane` evolves.
@@ -54,6 +57,16 @@ pub trait Evaluator: Send {
 
     /// Number of lanes.
     fn lane_count(&self) -> usize;
+
+    /// Makes a lane for `scene`, empty until it is loaded, and returns its number: the lowest that no lane has. None if there
+    /// is no room beside the lanes that are there.
+    ///
+    /// # Errors
+    /// If there is no room for it alone, or the device fails.
+    fn admit(&mut self, scene: Scene) -> Result<Option<usize>>;
+
+    /// Takes away a lane; its number and its room are free for another.
+    fn release(&mut self, lane: usize);
 
     /// Loads whole populations into lanes and evaluates these lanes afresh, in one dispatch.
     ///

@@ -113,8 +113,14 @@ impl Buffer {
     /// # Errors
     /// [`Error::Vulkan`] if the range is outside the buffer or the CPU cannot reach it.
     pub fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<()> {
-        self.check_range("read of", offset, bytes.len() as u64)?;
-        self.host_offset(offset).and_then(|offset| self.memory.read(offset, bytes)).ok_or_else(|| self.unreachable())
+        self.look(offset, bytes.len() as u64, |read| bytes.copy_from_slice(read))
+    }
+
+    /// Looks at bytes where they lie; else as [`Self::read`].
+    pub(super) fn look<T>(&self, offset: u64, size_bytes: u64, look: impl FnOnce(&[u8]) -> T) -> Result<T> {
+        self.check_range("read of", offset, size_bytes)?;
+        let range = self.host_offset(offset).zip(usize::try_from(size_bytes).ok());
+        range.and_then(|(offset, size)| self.memory.look(offset, size, look)).ok_or_else(|| self.unreachable())
     }
 
     pub(super) fn raw(&self) -> vk::Buffer {

@@ -81,12 +81,11 @@ impl Memory {
         Some(())
     }
 
-    /// Copies mapped memory into `bytes`; `None` if it is not mapped or too short.
-    pub(super) fn read(&self, offset: usize, bytes: &mut [u8]) -> Option<()> {
+    /// Looks at `size` bytes of mapped memory; `None` if it is not mapped or too short.
+    pub(super) fn look<T>(&self, offset: usize, size: usize, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
         let allocation = lock(&self.allocation);
         let mapped = allocation.mapped_slice()?;
-        bytes.copy_from_slice(mapped.get(offset..offset.checked_add(bytes.len())?)?);
-        Some(())
+        Some(look(mapped.get(offset..offset.checked_add(size)?)?))
     }
 }
 

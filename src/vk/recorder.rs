@@ -146,18 +146,27 @@ impl Recorder {
     /// # Errors
     /// [`Error::Vulkan`] if the ticket is of another submission, or `bytes` has another size.
     pub fn read_into(&self, ticket: &ReadTicket, bytes: &mut [u8]) -> Result<()> {
-        if self.is_recording || ticket.submission != self.submission {
-            return Err(refused("read-back", "the ticket is not of the submission that ran last"));
-        }
         if bytes.len() as u64 != ticket.size_bytes {
             return Err(refused(
                 "read-back",
                 format!("{} bytes asked for of a ticket for {}", bytes.len(), ticket.size_bytes),
             ));
         }
+        self.look(ticket, |read| bytes.copy_from_slice(read))
+    }
+
+    /// Looks at the bytes of a ticket where they lie, without copying them, after its submission and before anything else is
+    /// recorded. They may lie at any address.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the ticket is of another submission.
+    pub fn look<T>(&self, ticket: &ReadTicket, look: impl FnOnce(&[u8]) -> T) -> Result<T> {
+        if self.is_recording || ticket.submission != self.submission {
+            return Err(refused("read-back", "the ticket is not of the submission that ran last"));
+        }
         match &ticket.buffer {
-            Some(buffer) => buffer.read(ticket.offset, bytes),
-            None => self.read_backs.read(ticket.offset, bytes),
+            Some(buffer) => buffer.look(ticket.offset, ticket.size_bytes, look),
+            None => self.read_backs.look(ticket.offset, ticket.size_bytes, look),
         }
     }
 

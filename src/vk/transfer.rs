@@ -286,12 +286,12 @@ impl ReadBacks {
         Ok(())
     }
 
-    /// Copies read-back bytes of the last submission out of the staging buffer.
-    pub(super) fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<()> {
+    /// Looks at read-back bytes of the last submission in the staging buffer.
+    pub(super) fn look<T>(&self, offset: u64, size_bytes: u64, look: impl FnOnce(&[u8]) -> T) -> Result<T> {
         match &self.staging.buffer {
-            Some(staging) => staging.read(offset, bytes),
+            Some(staging) => staging.look(offset, size_bytes, look),
             // Without a staging buffer nothing was copied: only empty reads come here.
-            None => Ok(()),
+            None => Ok(look(&[])),
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::canary;
 use crate::scenarios::holed_masks;
 
 /// A white star of five points on black.
-fn star(width_px: u32, height_px: u32) -> Target {
+pub fn star(width_px: u32, height_px: u32) -> Target {
     let inside = |x: u32, y: u32| {
         let (x, y) = (f64::from(2 * x) / f64::from(width_px) - 1.0, f64::from(2 * y) / f64::from(height_px) - 1.0);
         let sector = (y.atan2(x) * 5.0 / std::f64::consts::TAU).rem_euclid(1.0);
@@ -25,14 +25,14 @@ fn star(width_px: u32, height_px: u32) -> Target {
     Target::new(width_px, height_px, (0..width_px * height_px).map(pixel).collect()).expect("the size is right")
 }
 
-fn parrots(x0: u32, y0: u32, width_px: u32, height_px: u32) -> Target {
+pub fn parrots(x0: u32, y0: u32, width_px: u32, height_px: u32) -> Target {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/photos/parrots.png");
     let photo = image::open(&path).expect("the photo can be read").into_rgb8();
     let pixel = |index: u32| photo.get_pixel(x0 + index % width_px, y0 + index / width_px).0;
     Target::new(width_px, height_px, (0..width_px * height_px).map(pixel).collect()).expect("the size is right")
 }
 
-fn course(target: Target, fly_count: usize, change: impl FnOnce(&mut Rules)) -> Course {
+pub fn course(target: Target, fly_count: usize, change: impl FnOnce(&mut Rules)) -> Course {
     let area = f64::from(target.width_px()) * f64::from(target.height_px());
     let side = (64.0 * (area / fly_count as f64).sqrt()) as u32;
     let mut rules = Rules::free(7, side, fly_count, [0; 3]);
@@ -41,7 +41,7 @@ fn course(target: Target, fly_count: usize, change: impl FnOnce(&mut Rules)) -> 
     Course { rules, target: Arc::new(target), guide, masks: Arc::new(MaskSet::default()), fly_count }
 }
 
-fn narrow(device: &Device) -> CellShape {
+pub fn narrow(device: &Device) -> CellShape {
     CellShape { lanes: device.info().subgroup_size, form: CellForm::Narrow, budget: 60_000 }
 }
 
@@ -76,7 +76,7 @@ pub fn check_named_rounds(device: &Arc<Device>, (name, course): (&str, &Course),
 }
 
 /// Flies that mutants can come from.
-fn first_flies(course: &Course) -> Vec<Fly> {
+pub fn first_flies(course: &Course) -> Vec<Fly> {
     let mut births = course.rules.births;
     births.kind = BirthKind::Fresh;
     let mut search = CpuSearch::new(Course { rules: Rules { births, ..course.rules }, ..course.clone() });
@@ -84,7 +84,8 @@ fn first_flies(course: &Course) -> Vec<Fly> {
     search.read_back().expect("the twin works").flies
 }
 
-fn check_equal(twin: &mut CpuSearch, search: &mut VulkanSearch, when: &str) {
+/// Compares all that can be read back of two searches.
+pub fn check_equal(twin: &mut dyn Search, search: &mut dyn Search, when: &str) {
     let (expected, found) = (twin.read_back().expect("the twin works"), search.read_back().expect("the device works"));
     for (fly, (expected, found)) in expected.flies.iter().zip(&found.flies).enumerate() {
         assert_eq!(found, expected, "fly {fly}: {when}");
@@ -136,7 +137,7 @@ fn weighed(target: Target) -> Target {
 }
 
 /// Everything that a style may ask for: a course for each, and some together.
-fn courses() -> Vec<(&'static str, Course)> {
+pub fn courses() -> Vec<(&'static str, Course)> {
     let photo = || parrots(200, 200, 100, 90);
     let plain = |change: fn(&mut Rules)| course(photo(), 200, change);
     let masks = Arc::new(holed_masks());

@@ -86,7 +86,7 @@ fn sprayed_pictures_come_to_the_twins_state_after_every_round_in_narrow_and_wide
 }
 
 /// Courses for what a style may ask for.
-fn courses() -> Vec<(&'static str, Course)> {
+pub fn courses() -> Vec<(&'static str, Course)> {
     let plain = |change: fn(&mut Rules)| course(parrots(80, 66), 110, change);
     vec![
         ("weights and transparent pixels", course(uneven(parrots(80, 66)), 110, |rules| rules.candidates = 3)),

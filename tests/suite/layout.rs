@@ -102,10 +102,10 @@ fn twins() -> Vec<Twin> {
         twin!(Instance = "Instance" in Array of ["mosaic.vert"] {
             axis_u = "axis_u", axis_v = "axis_v", centre = "centre", fly = "fly", rank = "rank"
         }),
-        twin!(FlyRecord = "Fly" in Array of ["cells.comp", "cells_deal.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        twin!(FlyRecord = "Fly" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
             x = "x", y = "y", z = "z", rg = "rg", ba = "ba", w = "w", h = "h", form = "form"
         }),
-        twin!(SearchRules = "SearchRules" in Array of ["cells.comp", "cells_deal.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        twin!(SearchRules = "SearchRules" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
             seed_low = "seed_low", seed_high = "seed_high", width = "width", height = "height", columns = "columns",
             side_shift = "side_shift", fly_count = "fly_count", scratch_words = "scratch_words", side = "side",
             candidates = "candidates", steps_per_fly = "steps_per_fly", deal_tournament = "deal_tournament",
@@ -118,18 +118,23 @@ fn twins() -> Vec<Twin> {
             depth_gap = "depth_gap", grout = "grout", grout_color = "grout_color", guide_columns = "guide_columns", guide_rows = "guide_rows",
             class_count = "class_count", end_0 = "end_0", end_1 = "end_1", end_2 = "end_2", scale_0 = "scale_0",
             scale_1 = "scale_1", scale_2 = "scale_2", scale_3 = "scale_3", first_round_0 = "first_round_0",
-            first_round_1 = "first_round_1", first_round_2 = "first_round_2", first_round_3 = "first_round_3"
+            first_round_1 = "first_round_1", first_round_2 = "first_round_2", first_round_3 = "first_round_3",
+            background = "background", lane = "lane", first_fly = "first_fly", first_deal = "first_deal",
+            first_cell = "first_cell", first_pixel = "first_pixel", first_stack = "first_stack",
+            first_scratch = "first_scratch", first_guide = "first_guide", first_mask = "first_mask"
         }),
-        twin!(SearchHeader = "Header" in Array of ["cells.comp", "cells_deal.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        twin!(SearchHeader = "Header" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
             round = "round", wanted = "wanted", pending = "pending", is_fresh = "is_fresh", overrun = "overrun",
             evals_low = "evals_low", evals_high = "evals_high", births_low = "births_low",
             births_high = "births_high", accepted_low = "accepted_low", accepted_high = "accepted_high",
             change_low = "change_low", change_high = "change_high", iterations = "iterations"
         }),
-        twin!(CellRecord = "CellRecord" in Array of ["cells.comp", "cells_deal.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        twin!(CellRecord = "CellRecord" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
             first = "first", count = "count", step = "step", dealt = "dealt", filled = "filled"
         }),
-        twin!(CellsPush = "Push" in PushConstants of ["cells.comp", "cells_glazed.comp"] { budget = "budget" }),
+        twin!(CellsPush = "Push" in PushConstants of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+            first_lane = "first_lane", budget = "budget"
+        }),
         twin!(EvaluatePush = "Push" in PushConstants of ["evaluate.comp"] {
             item_count = "item_count", left_out_fly = "left_out_fly", sum_offset = "sum_offset"
         }),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::rules::Rules;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::{Blend, Fly, Guide, MaskSet, Target};
 
 /// What stays the same while a picture is searched.
@@ -114,4 +114,111 @@ pub trait Search: Send {
     /// # Errors
     /// If the device fails.
     fn read_back_stacks(&mut self) -> Result<Stacks>;
+}
+
+/// Searches several pictures side by side on one device. A lane is one search; what it comes to never depends on the others.
+///
+/// # Panics
+/// All methods that name a lane may, if it was not admitted or was dismissed.
+pub trait SearchLanes: Send {
+    /// Takes in a search, which begins with the flies of `first` or, without, with absent ones; returns its lane. None: there is no room
+    /// until others are dismissed.
+    ///
+    /// # Errors
+    /// If the search alone is too large for the device, which concerns no other lane; or if the device fails.
+    fn admit(&mut self, course: Course, first: Option<&[Fly]>) -> Result<Option<usize>>;
+
+    /// Lets a search go; its lane may be another one's next.
+    fn dismiss(&mut self, lane: usize);
+
+    /// What stays the same in a lane.
+    fn course(&self, lane: usize) -> &Course;
+
+    /// How far a lane has come.
+    fn standing(&self, lane: usize) -> Standing;
+
+    /// As [`Search::load`].
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn load(&mut self, lane: usize, flies: &[Fly]) -> Result<()>;
+
+    /// Asks for so many rounds more.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn ask(&mut self, lane: usize, rounds: u32) -> Result<()>;
+
+    /// Whether a lane has rounds to make.
+    fn is_busy(&self, lane: usize) -> bool;
+
+    /// Makes one submission for all lanes that have rounds to make: until about one of them is done, and no longer than the clock may
+    /// wait.
+    ///
+    /// # Errors
+    /// If the device fails, which ends all lanes.
+    fn work(&mut self) -> Result<()>;
+
+    /// Why a lane will make no more rounds, if it failed; told once. It is not busy then.
+    fn failure(&mut self, lane: usize) -> Option<Error>;
+
+    /// As [`Search::renormalise`], of lanes that are not busy.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn renormalise(&mut self, lanes: &[usize]) -> Result<()>;
+
+    /// As [`Search::read_back`].
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn read_back(&mut self, lane: usize) -> Result<SearchState>;
+
+    /// As [`Search::read_back_stacks`].
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn read_back_stacks(&mut self, lane: usize) -> Result<Stacks>;
+}
+
+/// One lane as a search of its own. While it makes rounds, the others make those that they were asked for.
+pub struct OneLane<'a> {
+    /// All lanes.
+    pub lanes: &'a mut dyn SearchLanes,
+    /// The one.
+    pub lane: usize,
+}
+
+impl Search for OneLane<'_> {
+    fn course(&self) -> &Course {
+        self.lanes.course(self.lane)
+    }
+
+    fn load(&mut self, flies: &[Fly]) -> Result<()> {
+        self.lanes.load(self.lane, flies)
+    }
+
+    fn advance(&mut self, rounds: u32) -> Result<()> {
+        self.lanes.ask(self.lane, rounds)?;
+        while self.lanes.is_busy(self.lane) {
+            self.lanes.work()?;
+        }
+        self.lanes.failure(self.lane).map_or(Ok(()), Err)
+    }
+
+    fn renormalise(&mut self) -> Result<()> {
+        self.lanes.renormalise(&[self.lane])
+    }
+
+    fn standing(&self) -> Standing {
+        self.lanes.standing(self.lane)
+    }
+
+    fn read_back(&mut self) -> Result<SearchState> {
+        self.lanes.read_back(self.lane)
+    }
+
+    fn read_back_stacks(&mut self) -> Result<Stacks> {
+        self.lanes.read_back_stacks(self.lane)
+    }
 }

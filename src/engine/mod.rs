@@ -3,16 +3,25 @@
 //! One generation: every evolution breeds, the evaluator refreshes what changed in one dispatch, every evolution
 //! absorbs its new fitness. The engine names no backend, reads no clock and writes no file; an [`Observer`] may.
 //!
-//! **Many pictures.** A device wants them as lanes of one engine, which share each dispatch. The CPU wants an engine each,
-//! by [`side_by_side`]: a birth touches a few blocks, too little work to share among threads, while whole evolutions share
+//! **Many pictures.** A device wants them as lanes, which share each dispatch: of one engine if all begin and end together,
+//! else of a [`PaperCrew`]. The CPU wants an engine each, by [`side_by_side`]: a birth touches a few blocks, too little work to share among threads, while whole evolutions share
 //! nothing and scale with the cores (`cargo bench --bench lanes`).
+
+mod crew;
+mod paper_crew;
+mod stepping;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use stepping::Stepper;
+
 use crate::error::{Error, Result};
-use crate::evolve::{Evolution, Step, StopReason};
-use crate::model::{Change, Evaluator, Fly};
+use crate::evolve::{Evolution, StopReason};
+use crate::model::Evaluator;
+
+pub use self::crew::{Ended, Finished, SearchCrew};
+pub use self::paper_crew::{PaperCrew, PaperResult, PaperTask};
 
 /// Watches an evolution and may end it.
 pub trait Observer {
@@ -96,7 +105,7 @@ pub fn side_by_side<T: Send>(count: usize, piece: impl Fn(usize) -> Result<T> + 
 pub struct Engine {
     evaluator: Box<dyn Evaluator>,
     evolutions: Vec<Evolution>,
-    changes: Vec<Change>,
+    stepper: Stepper,
 }
 
 impl Engine {
@@ -108,7 +117,7 @@ impl Engine {
     pub fn new(evaluator: Box<dyn Evaluator>, evolutions: Vec<Evolution>) -> Self {
         assert_eq!(evaluator.lane_count(), evolutions.len(), "one evolution per lane");
         assert!(evolutions.iter().enumerate().all(|(lane, evolution)| evolution.lane() == lane));
-        Self { evaluator, evolutions, changes: Vec::new() }
+        Self { evaluator, evolutions, stepper: Stepper::default() }
     }
 
     /// The evolutions, in the order of their lanes.
@@ -128,53 +137,15 @@ impl Engine {
     /// # Errors
     /// If the evaluator's device fails.
     pub fn run(&mut self, observer: &mut dyn Observer) -> Result<()> {
-        let populations: Vec<(usize, &[Fly])> = self.evolutions.iter().map(|e| (e.lane(), e.flies())).collect();
-        self.evaluator.load(&populations)?;
-        for evolution in &mut self.evolutions {
-            evolution.absorb(&[], self.evaluator.evaluation(evolution.lane()).sae);
-        }
-        observer.at_start(&self.evolutions);
-        while self.generation()? {
-            if let Some(reason) = observer.after_generation(&self.evolutions) {
-                self.evolutions.iter_mut().for_each(|evolution| evolution.stop(reason));
+        let Self { evaluator, evolutions, stepper } = self;
+        Stepper::begin(&mut **evaluator, evolutions)?;
+        observer.at_start(evolutions);
+        while stepper.generation(&mut **evaluator, evolutions)? > 0 {
+            if let Some(reason) = observer.after_generation(evolutions) {
+                evolutions.iter_mut().for_each(|evolution| evolution.stop(reason));
             }
         }
-        let populations: Vec<(usize, &[Fly])> = self.evolutions.iter().map(|e| (e.lane(), e.best_flies())).collect();
-        self.evaluator.load(&populations)
-    }
-
-    /// Breed, evaluate, absorb; false when all evolutions have ended.
-    fn generation(&mut self) -> Result<bool> {
-        self.changes.clear();
-        let mut shares = Vec::with_capacity(self.evolutions.len());
-        let mut restarted = Vec::new();
-        let mut any_alive = false;
-        for evolution in &mut self.evolutions {
-            let first = self.changes.len();
-            let (lane, evaluation) =
-                (self.evaluator.lane(evolution.lane()), self.evaluator.evaluation(evolution.lane()));
-            match evolution.breed(lane, &evaluation, &mut self.changes) {
-                Step::Replace => any_alive = true,
-                Step::Restart => {
-                    any_alive = true;
-                    restarted.push(evolution.lane());
-                }
-                Step::Stop(_) => {}
-            }
-            shares.push(first..self.changes.len());
-        }
-        if !restarted.is_empty() {
-            let populations: Vec<(usize, &[Fly])> =
-                restarted.iter().map(|&lane| (lane, self.evolutions[lane].flies())).collect();
-            self.evaluator.load(&populations)?;
-        }
-        if !self.changes.is_empty() {
-            self.evaluator.replace(&self.changes)?;
-        }
-        for (evolution, share) in self.evolutions.iter_mut().zip(shares) {
-            evolution.absorb(&self.changes[share], self.evaluator.evaluation(evolution.lane()).sae);
-        }
-        Ok(any_alive)
+        Stepper::end(&mut **evaluator, evolutions)
     }
 }
 
