@@ -11,6 +11,7 @@ use super::batch::BatchArgs;
 use super::bench::BenchArgs;
 use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
+use super::inside::InsideArgs;
 use super::manual::{CompletionsArgs, ManArgs};
 use super::merge::MergeArgs;
 use super::paper::PaperArgs;
@@ -215,6 +216,8 @@ pub(super) struct EvolveArgs {
     /// Watch every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
+    #[command(flatten)]
+    pub inside: InsideArgs,
 
     #[command(flatten)]
     pub messages: MessageArgs,

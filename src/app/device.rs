@@ -2,15 +2,18 @@
 
 use std::sync::Arc;
 
+use super::pipelines::{KeptPipelines, PipelineFile};
+use super::prepared::check_messages;
 use crate::cpu::CpuEvaluator;
 use crate::cpu::cells::CpuSearch;
+use crate::engine::{PaperCrew, SearchCrew};
 use crate::error::{Error, Result};
-use crate::gpu::{GpuEvaluator, VulkanSearch};
+use crate::gpu::{GpuEvaluator, VulkanLanes, VulkanSearch};
 use crate::model::cells::{Course, Search};
 use crate::model::{Evaluator, Fly, Scene};
 use crate::vk::{
-    Choice, Device, DeviceInfo, DeviceKind, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation,
-    ValidationLog, choose,
+    Choice, Device, DeviceInfo, DeviceKind, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Timing,
+    Validation, ValidationLog, choose,
 };
 
 /// The device that was chosen, ready for an evaluator.
@@ -26,6 +29,8 @@ pub(super) enum Selected {
         validation_log: Arc<ValidationLog>,
         /// Whether somebody asked for Vulkan; else the CPU may stand in for it.
         is_asked_for: bool,
+        /// Keeps what the driver compiled for the next run.
+        _pipelines: KeptPipelines,
     },
 }
 
@@ -99,11 +104,7 @@ pub(super) fn select_all(validation: Validation) -> Result<Vec<Selected>> {
             "--devices all: there is no hardware GPU; see smalti devices, or leave it to --device auto".to_owned();
         return Err(Error::NoSuitableDevice { why });
     }
-    let open = |info: &&DeviceInfo| {
-        let device = Device::create(&instance, info, &DeviceOptions::default())?;
-        Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()), is_asked_for: true })
-    };
-    gpus.iter().map(open).collect()
+    gpus.into_iter().map(|info| open(&instance, info, true)).collect()
 }
 
 fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: bool) -> Result<Selected> {
@@ -119,8 +120,16 @@ fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: 
     };
     let info = devices.iter().find(|info| info.index == index);
     let info = info.ok_or_else(|| Error::Internal(format!("device {index} was chosen and is not listed")))?;
-    let device = Device::create(&instance, info, &DeviceOptions::default())?;
-    Ok(Selected::Vulkan { device, validation_log: Arc::clone(instance.validation_log()), is_asked_for })
+    open(&instance, info, is_asked_for)
+}
+
+fn open(instance: &Arc<Instance>, info: &DeviceInfo, is_asked_for: bool) -> Result<Selected> {
+    let pipelines = PipelineFile::read(info);
+    let options = DeviceOptions { pipeline_cache: pipelines.bytes().to_vec(), ..DeviceOptions::default() };
+    let device = Device::create(instance, info, &options)?;
+    let validation_log = Arc::clone(instance.validation_log());
+    let _pipelines = KeptPipelines::new(pipelines, &device);
+    Ok(Selected::Vulkan { device, validation_log, is_asked_for, _pipelines })
 }
 
 /// The CPU twin in place of a Vulkan that failed and that nobody asked for.
@@ -140,6 +149,11 @@ pub(super) fn why_no_vulkan(error: &Error) -> String {
 }
 
 impl Selected {
+    /// Whether somebody asked for this device; else the CPU may stand in for it.
+    pub(super) fn is_asked_for(&self) -> bool {
+        matches!(self, Self::Vulkan { is_asked_for: true, .. })
+    }
+
     /// The device's name, for people.
     pub(super) fn label(&self) -> &str {
         match self {
@@ -159,6 +173,28 @@ impl Selected {
                 let evaluator = Box::new(GpuEvaluator::create(device, scenes)?);
                 Ok(Opened { evaluator, validation_log: Some(Arc::clone(validation_log)) })
             }
+        }
+    }
+
+    /// The crews that evolve many pictures as lanes of this device, by either scheme; none on the CPU, which has a thread for each
+    /// picture instead.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub(super) fn crews(&self) -> Result<Option<(SearchCrew, PaperCrew)>> {
+        let Self::Vulkan { device, .. } = self else { return Ok(None) };
+        let searches = SearchCrew::new(Box::new(VulkanLanes::create(device, Timing::Off)?));
+        Ok(Some((searches, PaperCrew::new(Box::new(GpuEvaluator::create(device, Vec::new())?)))))
+    }
+
+    /// What the validation layer said, as an error.
+    ///
+    /// # Errors
+    /// [`Error::Validation`] if it said anything.
+    pub(super) fn check_validation(&self) -> Result<()> {
+        match self {
+            Self::Cpu { .. } => Ok(()),
+            Self::Vulkan { validation_log, .. } => check_messages(validation_log),
         }
     }
 
@@ -197,14 +233,16 @@ impl Selected {
         };
         match self {
             Self::Cpu { .. } => Ok(on_cpu(course, None)),
-            Self::Vulkan { device, validation_log, is_asked_for } => match VulkanSearch::new(device, course.clone()) {
-                Ok(search) => {
-                    let validation_log = Some(Arc::clone(validation_log));
-                    Ok(OpenedSearch { search: Box::new(search), stand_in: None, validation_log })
+            Self::Vulkan { device, validation_log, is_asked_for, .. } => {
+                match VulkanSearch::new(device, course.clone()) {
+                    Ok(search) => {
+                        let validation_log = Some(Arc::clone(validation_log));
+                        Ok(OpenedSearch { search: Box::new(search), stand_in: None, validation_log })
+                    }
+                    Err(error) if !is_asked_for => Ok(on_cpu(course, Some(why_no_vulkan(&error)))),
+                    Err(error) => Err(error),
                 }
-                Err(error) if !is_asked_for => Ok(on_cpu(course, Some(why_no_vulkan(&error)))),
-                Err(error) => Err(error),
-            },
+            }
         }
     }
 }

@@ -54,8 +54,10 @@ impl Job {
         let background = asked_for.unwrap_or_default();
         let behind = if keeps_transparency(options) { Background::Transparent } else { Background::Color(background) };
         let reading = ReadOptions { background: behind, long_side_px: Some(options.long_side_px) };
+        let decoding = options.tracer.span("decode");
         let Picture { target, palette, original_size_px, sha256, warnings } =
             Picture::read(&options.input, &reading, &options.colors, options.weight.as_deref())?;
+        drop(decoding);
         let dress = dress(options, init.as_ref())?;
         let palette = palette.map(Palette::new).transpose()?;
         let worn = dress.as_ref().map(|dress| &dress.masks).or(init.as_ref().map(|population| &population.masks));

@@ -9,6 +9,7 @@ use super::cli::{EvolveArgs, MessageArgs, ProgressKind};
 use super::computing::Computing;
 use super::curve_file::CurveFile;
 use super::destination::{self, Destination};
+use super::inside::Tracer;
 use super::look::Look;
 use super::picture::{PictureArgs, SchemeName};
 use super::presets::{Preset, PresetChoice};
@@ -117,6 +118,8 @@ pub(super) struct EvolveOptions {
     pub computing: Computing,
     pub progress: ProgressKind,
     pub verbosity: Verbosity,
+    /// Where all work on the picture tells what it does.
+    pub tracer: Tracer,
 }
 
 impl EvolveOptions {
@@ -193,6 +196,7 @@ impl EvolveOptions {
             computing,
             progress: ProgressKind::None,
             verbosity,
+            tracer: Tracer::default(),
         })
     }
 

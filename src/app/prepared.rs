@@ -7,6 +7,7 @@ use super::curve_file::Tabled;
 use super::device::{Opened, Selected};
 use super::job::Job;
 use super::options::{EvolveOptions, SchemeOptions};
+use super::outputs::Drawn;
 use super::progress::Progress;
 use super::provenance::{Ending, Provenances};
 use super::report::{self, Row};
@@ -16,7 +17,7 @@ use super::{cells, destination, memory, result, scheme};
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::evolve::{Evolution, PaperScheme, Spread};
-use crate::model::Canvas;
+use crate::model::{Canvas, Evaluator};
 use crate::vk::ValidationLog;
 
 /// A picture that can be evolved.
@@ -35,6 +36,7 @@ impl Prepared {
     /// As [`Job::load`]; [`Error::TooLarge`] if the work does not fit into memory.
     pub(super) fn load(options: &EvolveOptions, row: &mut Row) -> Result<Self> {
         let began = Instant::now();
+        let _span = options.tracer.span("load").tell("picture", row.id.as_str());
         let job = Job::load(options)?;
         row.load_ms = report::milliseconds(began.elapsed());
         row.tiles = Some(job.fly_count);
@@ -56,6 +58,7 @@ impl Prepared {
         watchers: &mut Watchers<'_>,
         row: &mut Row,
     ) -> Result<Evolved> {
+        let _span = options.tracer.span("evolve").tell("picture", row.id.as_str());
         match &self.job.scheme {
             SchemeOptions::Paper(scheme) => evolve_job(options, &self.job, (scheme, selected), watchers, row),
             SchemeOptions::Cells(cells) => cells::search_job(options, &self.job, (cells, selected), watchers, row),
@@ -101,30 +104,49 @@ fn evolve_job(
     let Opened { evaluator, validation_log } = selected.open(vec![job.scene()])?;
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let evolution = Evolution::new(scheme.clone(), 0, width_px, height_px, job.first_flies(scheme));
-    let mut engine = Engine::new(evaluator, vec![evolution]);
+    let mut engine = Engine::new(options.tracer.evaluator(evaluator), vec![evolution]);
     let mut watch = Watch::begin(watchers, options.time_limit, Progress::new(options.progress));
-    let ran = engine.run(&mut (&mut watch, &mut curve));
+    let mut course = options.tracer.course();
+    let ran = engine.run(&mut (&mut (&mut watch, &mut curve), &mut course));
+    if let Some(course) = course {
+        course.finish(engine.evolutions());
+    }
     if let Some(curve) = &mut curve {
         curve.finish(engine.evolutions());
     }
     row.evolve_ms = report::milliseconds(watch.finish(&engine.evolutions()[0]));
     ran?;
-    let evolution = &engine.evolutions()[0];
-    row.note_evolution(evolution);
-    row.spread = Spread::of(evolution.best_flies(), width_px, height_px).clark_evans;
-    let ending = Ending::of(evolution);
-    let population = job.population(evolution.best_flies().to_vec());
+    let evolution = engine.evolutions()[0].clone();
     let evaluation = engine.evaluator().evaluation(0);
-    let (scored, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
+    let scored = (evaluation.sae, evaluation.marginal.to_vec());
+    let (ending, drawn) = finish_evolution((options, job), (&evolution, scored), engine.evaluator(), row)?;
+    drop(engine);
+    validation_log.map_or(Ok(()), |log| check_messages(&log))?;
+    Ok(Evolved { ending, drawn, curve: curve.map(|curve| Box::new(curve) as Box<dyn Tabled>) })
+}
+
+/// Draws the best population of an evolution of a job, which was evaluated once more to this SAE and these marginals; `row`
+/// takes it in.
+///
+/// # Errors
+/// If the device fails, or the SAE is another one than it was.
+pub(super) fn finish_evolution(
+    (options, job): (&EvolveOptions, &Job),
+    (evolution, (scored, marginal)): (&Evolution, (u64, Vec<i64>)),
+    evaluator: &mut dyn Evaluator,
+    row: &mut Row,
+) -> Result<(Ending, Drawn)> {
+    row.note_evolution(evolution);
+    row.spread = Spread::of(evolution.best_flies(), job.target.width_px(), job.target.height_px()).clark_evans;
+    let ending = Ending::of(evolution);
     if scored != ending.sae {
         let sentence = format!("the best population had an SAE of {} and is evaluated to {scored}", ending.sae);
         return Err(Error::Internal(sentence));
     }
-    let (drawn, psnr) = result::draw(engine.evaluator(), options, (population, marginal), ending.sae)?;
+    let population = job.population(evolution.best_flies().to_vec());
+    let (drawn, psnr) = result::draw(evaluator, (options, job), (population, marginal), ending.sae)?;
     row.psnr = psnr;
-    drop(engine);
-    validation_log.map_or(Ok(()), |log| check_messages(&log))?;
-    Ok(Evolved { ending, drawn, curve: curve.map(|curve| Box::new(curve) as Box<dyn Tabled>) })
+    Ok((ending, drawn))
 }
 
 /// Turns what the validation layer said into an error.

@@ -19,20 +19,20 @@ pub(super) struct Evolved {
     pub curve: Option<Box<dyn Tabled>>,
 }
 
-/// Draws a population, with the marginal fitness of its flies, at evaluation size and at the size asked for; also returns its
-/// peak signal-to-noise ratio in dB, if that is not infinite.
+/// Draws a population of `job`, with the marginal fitness of its flies, at evaluation size and at the size asked for; also
+/// returns its peak signal-to-noise ratio in dB, if that is not infinite.
 ///
 /// # Errors
 /// If the device fails, or if the mosaic is not what was scored.
 pub(super) fn draw(
     evaluator: &mut dyn Evaluator,
-    options: &EvolveOptions,
+    (options, job): (&EvolveOptions, &Job),
     (population, marginal): (Population, Vec<i64>),
     scored: u64,
 ) -> Result<(Drawn, Option<f64>)> {
     let (width_px, height_px) = (population.width_px, population.height_px);
     let mosaic = evaluator.draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
-    let difference = difference(&mosaic.pixels, &evaluator.scene(0).target);
+    let difference = difference(&mosaic.pixels, &job.target);
     let drawn = difference.sae();
     if drawn != scored {
         return Err(Error::Internal(format!("the best population had an SAE of {scored} and is drawn with {drawn}")));

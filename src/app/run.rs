@@ -8,6 +8,7 @@ use super::cli::EvolveArgs;
 use super::curve_file::CurveFile;
 use super::destination::Destination;
 use super::device::Selected;
+use super::inside::{self, Capture, CaptureRange, InsideArgs};
 use super::interrupt::Interrupt;
 use super::job::Job;
 use super::options::{EvolveOptions, Mode, SchemeOptions, Verbosity, scheme_name};
@@ -23,7 +24,7 @@ use crate::error::Result;
 /// Evolves one picture and reports about it; the exit code of the process.
 pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
     let mut row = Row::new(&args.input, args.picture.seed, scheme_name(&args.picture));
-    let done = EvolveOptions::new(args).and_then(|options| evolve_picture(&options, &mut row));
+    let done = EvolveOptions::new(args).and_then(|options| evolve_watched(options, &args.inside, &mut row));
     if let Err(error) = &done {
         row.note_failure(error);
         report::error(&error.to_string());
@@ -38,9 +39,32 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
     }
 }
 
-/// The work, in order: check, read, evolve and draw, encode and write.
-fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
+/// As [`evolve_picture`], and writes the trace if one was asked for.
+fn evolve_watched(mut options: EvolveOptions, inside: &InsideArgs, row: &mut Row) -> Result<()> {
     let interrupt = Interrupt::listen()?;
+    if let (Some(path), Mode::Work) = (&inside.trace, options.mode) {
+        let written = options.destinations().map(|destination| &destination.path);
+        let taken = written.chain(options.curves.iter().map(|file| &file.path)).chain(&options.init);
+        let taken: Vec<&Path> = taken.map(PathBuf::as_path).chain(options.picture_inputs()).collect();
+        options.tracer = inside::begin_trace(path, &taken, options.overwrite)?;
+    }
+    evolve_picture(&options, inside.capture, &interrupt, row)?;
+    let Some(path) = inside.trace.as_ref().filter(|_| options.tracer.is_on()) else { return Ok(()) };
+    let events = interrupt.while_writing(|| options.tracer.finish())?;
+    row.output.push(path.display().to_string());
+    if options.verbosity > Verbosity::Quiet {
+        report::say(&format!("smalti: {} has {events} events; ui.perfetto.dev shows them", path.display()));
+    }
+    Ok(())
+}
+
+/// The work, in order: check, read, evolve and draw, encode and write.
+fn evolve_picture(
+    options: &EvolveOptions,
+    capture: Option<CaptureRange>,
+    interrupt: &Interrupt,
+    row: &mut Row,
+) -> Result<()> {
     options.computing.start_threads()?;
     let inputs = options.picture_inputs();
     destination::check_writable(options.destinations(), &inputs)?;
@@ -48,7 +72,12 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     let written = options.destinations().map(|destination| &destination.path);
     let mut written = written.chain(options.curves.iter().map(|file| &file.path)).map(PathBuf::as_path);
     options.save_run.iter().try_for_each(|save_run| save_run.check_place(&mut written, &inputs))?;
-    let selected = options.computing.select()?;
+    let selected = {
+        let _span = options.tracer.span("open device");
+        options.computing.select()?
+    };
+    inside::trace_device(&options.tracer, &selected);
+    let capture = capture.map(|range| inside::begin_capture(range, &selected)).transpose()?;
     row.device = Some(selected.label().to_owned());
 
     let prepared = Prepared::load(options, row)?;
@@ -68,27 +97,42 @@ fn evolve_picture(options: &EvolveOptions, row: &mut Row) -> Result<()> {
     }
 
     let recorder = begin_record(options, job, provenances)?;
-    let mut watchers = Watchers { interrupt: &interrupt, recorder };
+    let mut watchers = Watchers { interrupt, recorder };
     let Evolved { ending, drawn, curve } = prepared.evolve(options, &selected, &mut watchers, row)?;
     let recorder = watchers.recorder;
     let began = Instant::now();
     let status = ending.status;
     let outputs = outputs_to_write(options, provenances, &ending);
+    let encoding = options.tracer.span("encode");
     let mut files = outputs::encode(&outputs, drawn, &provenances.told(&ending))?;
     files.extend(result::encode_target(options, job, &provenances.target)?);
-    let written = outputs::write(&files, &interrupt, &mut row.output);
+    drop(encoding);
+    let writing = options.tracer.span("write");
+    let written = outputs::write(&files, interrupt, &mut row.output);
     let curve_written = curve.map_or(Ok(()), |curve| {
         let told = (provenances.population.key(), &ending);
         let files = curves_to_write(options, told);
-        curve_file::write(&files, (&*curve, row.id.as_str()), told, &interrupt, &mut row.output)
+        curve_file::write(&files, (&*curve, row.id.as_str()), told, interrupt, &mut row.output)
     });
+    drop(writing);
     written.and(curve_written)?;
     // A broken record of the course is no reason to lose its result.
     row.output.extend(recorder.map(Recorder::outcome).transpose()?);
+    capture.map_or(Ok(()), |capture| note_capture(&capture, options, row))?;
     row.save_ms = report::milliseconds(began.elapsed());
     row.status = status;
     if options.verbosity > Verbosity::Quiet {
         report::print_summary(row, options, job);
+    }
+    Ok(())
+}
+
+/// Tells where the capture is.
+fn note_capture(capture: &Capture, options: &EvolveOptions, row: &mut Row) -> Result<()> {
+    let (path, what) = capture.outcome()?;
+    row.output.push(path.display().to_string());
+    if options.verbosity > Verbosity::Quiet {
+        report::say(&format!("smalti: {} holds {what}; qrenderdoc opens it", path.display()));
     }
     Ok(())
 }

@@ -37,7 +37,7 @@ impl GpuEvaluator {
         let group = self.pass.bind_with_sums(&pipeline, &sums)?;
         self.recorder.write_buffer(&sums, 0, &vec![0; bytes as usize])?;
         for first in (0..fly_count).step_by(RE_RENDERS_PER_SUBMISSION as usize) {
-            let mut pass = self.recorder.compute_pass("re-render")?;
+            let mut pass = self.recorder.compute_pass("evaluate")?;
             for fly in first..fly_count.min(first + RE_RENDERS_PER_SUBMISSION) {
                 let push = EvaluatePush { item_count, left_out_fly: fly, sum_offset: fly };
                 self.pass.dispatch(&mut pass, &pipeline, &group, push);

@@ -1,6 +1,6 @@
 //! The logical device: one queue for graphics and compute, the memory allocator and the pipeline cache.
 
-use std::ffi::CString;
+use std::ffi::{CStr, CString};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -9,11 +9,12 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
+use super::observe::{Calibrated, clock_extension};
 use super::physical::{self, DeviceInfo};
-use super::{Instance, call_failed, lock, refused};
+use super::{Instance, SubmissionObserver, call_failed, lock, refused};
 use crate::error::{Error, Result};
 
-const PORTABILITY_SUBSET: &std::ffi::CStr = c"VK_KHR_portability_subset";
+const PORTABILITY_SUBSET: &CStr = c"VK_KHR_portability_subset";
 const MIB: u64 = 1 << 20;
 
 /// How bytes reach buffers on the device.
@@ -42,7 +43,9 @@ pub struct Device {
     queue: Mutex<vk::Queue>,
     queue_family: u32,
     staging: Staging,
+    recordings: AtomicU64,
     submissions: AtomicU64,
+    pub(super) observers: Mutex<Vec<Arc<dyn SubmissionObserver>>>,
     info: DeviceInfo,
     // After the allocator, which returns its memory to the device.
     raw: RawDevice,
@@ -52,7 +55,9 @@ pub struct Device {
 struct RawDevice {
     functions: ash::Device,
     debug_utils: Option<debug_utils::Device>,
-    _instance: Arc<Instance>,
+    calibrated: Option<Calibrated>,
+    physical: vk::PhysicalDevice,
+    instance: Arc<Instance>,
 }
 
 impl Drop for RawDevice {
@@ -72,9 +77,11 @@ impl Device {
         let (queue_family, _) = physical::queue_family(instance.raw(), physical).ok_or_else(|| {
             Error::NoSuitableDevice { why: format!("{} has no queue for graphics and compute", info.name) }
         })?;
-        let functions = create_raw(instance, physical, queue_family, info)?;
+        let clock = clock_extension(instance, physical)?;
+        let functions = create_raw(instance, (physical, info), queue_family, clock)?;
         let debug_utils = instance.has_debug_utils().then(|| debug_utils::Device::new(instance.raw(), &functions));
-        let raw = RawDevice { functions, debug_utils, _instance: Arc::clone(instance) };
+        let calibrated = clock.map(|name| Calibrated::new(instance.raw(), &functions, name));
+        let raw = RawDevice { functions, debug_utils, calibrated, physical, instance: Arc::clone(instance) };
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw().clone(),
             device: raw.functions.clone(),
@@ -97,10 +104,15 @@ impl Device {
             queue: Mutex::new(queue),
             queue_family,
             staging: options.staging,
+            recordings: AtomicU64::new(0),
             submissions: AtomicU64::new(0),
+            observers: Mutex::default(),
             info: info.clone(),
             raw,
         };
+        device.set_name(device.raw().handle(), "device");
+        device.set_name(queue, "queue");
+        device.set_name(device.pipeline_cache, "pipeline cache");
         Ok(Arc::new(device))
     }
 
@@ -148,13 +160,33 @@ impl Device {
         self.pipeline_cache
     }
 
-    /// A number that no other submission of this device has.
+    pub(super) fn calibrated(&self) -> Option<&Calibrated> {
+        self.raw.calibrated.as_ref()
+    }
+
+    pub(super) fn instance(&self) -> &Instance {
+        &self.raw.instance
+    }
+
+    pub(super) fn physical(&self) -> vk::PhysicalDevice {
+        self.raw.physical
+    }
+
+    /// A number that no other recording of this device has.
+    pub(super) fn next_recording(&self) -> u64 {
+        self.recordings.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// The number of the next submission, counted from 1.
     pub(super) fn next_submission(&self) -> u64 {
-        self.submissions.fetch_add(1, Ordering::Relaxed)
+        self.submissions.fetch_add(1, Ordering::Relaxed) + 1
     }
 
     /// Gives a handle its debug name. Names serve people only, so a failure is not worth an error.
-    pub(super) fn set_name<T: vk::Handle>(&self, handle: T, name: &str) {
+    pub(super) fn set_name<T: vk::Handle + Copy>(&self, handle: T, name: &str) {
+        if handle.is_null() {
+            return;
+        }
         if let (Some(debug_utils), Ok(name)) = (self.debug_utils(), CString::new(name)) {
             let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
             // SAFETY: V1; the handle was just created and no other thread has it.
@@ -192,13 +224,13 @@ fn find_physical(instance: &Instance, info: &DeviceInfo) -> Result<vk::PhysicalD
 
 fn create_raw(
     instance: &Instance,
-    physical: vk::PhysicalDevice,
+    (physical, info): (vk::PhysicalDevice, &DeviceInfo),
     queue_family: u32,
-    info: &DeviceInfo,
+    clock: Option<&CStr>,
 ) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
-    let mut extensions = Vec::new();
+    let mut extensions: Vec<_> = clock.into_iter().map(CStr::as_ptr).collect();
     // A partial implementation demands that whoever uses it says so.
     if physical::has_extension(instance.raw(), physical, PORTABILITY_SUBSET)? {
         extensions.push(PORTABILITY_SUBSET.as_ptr());

@@ -37,7 +37,7 @@ pub struct Instance {
     raw: ash::Instance,
     has_debug_utils: bool,
     // Unloads libvulkan, so it goes last.
-    _entry: ash::Entry,
+    entry: ash::Entry,
 }
 
 impl Instance {
@@ -54,7 +54,7 @@ impl Instance {
         let log = Arc::new(ValidationLog::default());
         let raw = create_raw(&entry, options.validation, extensions, &log)?;
         let mut instance =
-            Self { messenger: None, log, raw, has_debug_utils: extensions.debug_utils, _entry: entry.clone() };
+            Self { messenger: None, log, raw, has_debug_utils: extensions.debug_utils, entry: entry.clone() };
         if options.validation == Validation::On {
             instance.messenger = Some(Messenger::create(&entry, &instance.raw, &instance.log)?);
         }
@@ -88,6 +88,10 @@ impl Instance {
 
     pub(super) fn raw(&self) -> &ash::Instance {
         &self.raw
+    }
+
+    pub(super) fn entry(&self) -> &ash::Entry {
+        &self.entry
     }
 
     pub(super) fn has_debug_utils(&self) -> bool {

@@ -53,6 +53,9 @@ impl Memory {
                 }
                 other => refused(format!("allocation of memory for {}", purpose.name), other.to_string()),
             })?;
+        // The allocator puts several things into a block.
+        // SAFETY: V1; the handle is only named.
+        device.set_name(unsafe { allocation.memory() }, &format!("block with {}", purpose.name));
         Ok(Self { allocation: Mutex::new(allocation), device: Arc::clone(device) })
     }
 

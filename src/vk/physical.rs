@@ -49,6 +49,17 @@ pub struct DeviceLimits {
     pub timestamp_bits: u32,
 }
 
+impl DeviceLimits {
+    /// Nanoseconds from one timestamp to another, of which only the low bits count; negative if the second one is older.
+    #[must_use]
+    pub fn ns_between(&self, from_ticks: u64, to_ticks: u64) -> f64 {
+        let unused = 64 - self.timestamp_bits.clamp(1, 64);
+        // The highest bit that counts becomes the sign.
+        let ticks = (to_ticks.wrapping_sub(from_ticks) << unused).cast_signed() >> unused;
+        ticks as f64 * f64::from(self.timestamp_period_ns)
+    }
+}
+
 /// A Vulkan device as `smalti devices` lists it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceInfo {
@@ -309,6 +320,19 @@ fn dashed(uuid: &[u8; 16]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_counter_that_wraps_between_two_timestamps_still_gives_their_distance() {
+        let limits = |timestamp_bits, timestamp_period_ns| {
+            let limits = limits_of(&vk::PhysicalDeviceLimits::default(), timestamp_bits);
+            DeviceLimits { timestamp_period_ns, ..limits }
+        };
+        assert_eq!(limits(64, 1.0).ns_between(1_000, 3_000), 2_000.0);
+        assert_eq!(limits(64, 1.0).ns_between(3_000, 1_000), -2_000.0);
+        assert_eq!(limits(36, 1.0).ns_between((1 << 36) - 1_000, 1_000), 2_000.0);
+        assert_eq!(limits(36, 1.0).ns_between(1_000, (1 << 36) - 1_000), -2_000.0);
+        assert_eq!(limits(64, 0.5).ns_between(u64::MAX, 1_999_999), 1e6);
+    }
 
     #[test]
     fn a_uuid_is_written_in_five_dashed_groups() {

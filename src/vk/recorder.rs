@@ -12,9 +12,9 @@ use ash::vk;
 use super::handle::Owned;
 use super::scope::Scope;
 use super::submit::{allocate_command_buffers, begin_commands, create_command_pool, end_commands, record_barrier};
-use super::timer::Timer;
+use super::timer::{READ_BACKS, Timer, UPLOADS};
 use super::transfer::{ReadBacks, ReadTicket, Uploads};
-use super::{Buffer, Device, Image, ImageFormat, PassTime, Timing, call_failed, refused};
+use super::{Buffer, Device, Image, ImageFormat, PassTime, SubmissionObserver, Timing, call_failed, lock, refused};
 use crate::error::{Error, Result};
 
 /// Records one submission after the other and runs them.
@@ -30,7 +30,8 @@ pub struct Recorder {
     pool: Owned<vk::CommandPool>,
     fence: Owned<vk::Fence>,
     is_recording: bool,
-    submission: u64,
+    /// Of what is recorded or ran last; tickets carry it.
+    recording: u64,
     last_scope: Scope,
     last_pass: &'static str,
     /// A pass that is leaked instead of dropped leaves this set.
@@ -38,11 +39,14 @@ pub struct Recorder {
     stop_query: Option<u32>,
     label: Vec<u8>,
     failure: Option<Error>,
+    name: String,
+    observers: Vec<Arc<dyn SubmissionObserver>>,
     device: Arc<Device>,
 }
 
 impl Recorder {
-    /// Creates a recorder; its staging buffers come with their first use.
+    /// Creates a recorder; its staging buffers come with their first use. It also times its passes if an observer of the
+    /// device asks for that.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the driver refuses.
@@ -54,8 +58,11 @@ impl Recorder {
         // SAFETY: V1.
         let fence = unsafe { device.raw().create_fence(&vk::FenceCreateInfo::default(), None) }
             .map_err(|result| call_failed(format!("creation of the fence of {name}"), result))?;
+        let observers = lock(&device.observers).clone();
+        let asks = |observer: &Arc<dyn SubmissionObserver>| observer.timing() == Timing::On;
+        let timing = if observers.iter().any(asks) { Timing::On } else { timing };
         Ok(Self {
-            timer: Timer::create(device, timing)?,
+            timer: Timer::create(device, name, timing)?,
             uploads: Uploads::new(),
             read_backs: ReadBacks::new(),
             kept: Vec::new(),
@@ -64,13 +71,15 @@ impl Recorder {
             pool,
             fence: Owned::new(device, fence, name),
             is_recording: false,
-            submission: device.next_submission(),
+            recording: device.next_recording(),
             last_scope: Scope::Earlier,
             last_pass: "none",
             is_pass_open: false,
             stop_query: None,
             label: Vec::new(),
             failure: None,
+            name: name.to_owned(),
+            observers,
             device: Arc::clone(device),
         })
     }
@@ -121,7 +130,7 @@ impl Recorder {
         self.begin()?;
         buffer.check_range("read of", offset, size_bytes)?;
         let (buffer, offset) = self.read_backs.add_buffer(buffer, offset, size_bytes);
-        Ok(ReadTicket { submission: self.submission, buffer, offset, size_bytes })
+        Ok(ReadTicket { recording: self.recording, buffer, offset, size_bytes })
     }
 
     /// Asks for the pixels of a colour attachment, rows packed tightly, as they are after the last pass of this submission.
@@ -138,7 +147,7 @@ impl Recorder {
         }
         let offset = self.read_backs.add_image(image);
         let size_bytes = image.layer_bytes();
-        Ok(ReadTicket { submission: self.submission, buffer: None, offset, size_bytes })
+        Ok(ReadTicket { recording: self.recording, buffer: None, offset, size_bytes })
     }
 
     /// Fetches the bytes of a ticket, after its submission and before anything else is recorded.
@@ -161,7 +170,7 @@ impl Recorder {
     /// # Errors
     /// [`Error::Vulkan`] if the ticket is of another submission.
     pub fn look<T>(&self, ticket: &ReadTicket, look: impl FnOnce(&[u8]) -> T) -> Result<T> {
-        if self.is_recording || ticket.submission != self.submission {
+        if self.is_recording || ticket.recording != self.recording {
             return Err(refused("read-back", "the ticket is not of the submission that ran last"));
         }
         match &ticket.buffer {
@@ -186,7 +195,7 @@ impl Recorder {
             .map_err(|result| call_failed("vkResetCommandPool", result))?;
         begin_commands(&self.device, self.pass_commands)?;
         self.is_recording = true;
-        self.submission = self.device.next_submission();
+        self.recording = self.device.next_recording();
         self.last_scope = Scope::Earlier;
         self.last_pass = "none";
         if let Some(timer) = &mut self.timer {
@@ -202,15 +211,7 @@ impl Recorder {
         self.record_boundary(scope);
         self.last_pass = name;
         self.is_pass_open = true;
-        if let Some(debug_utils) = self.device.debug_utils() {
-            self.label.clear();
-            self.label.extend_from_slice(name.as_bytes());
-            self.label.push(0);
-            let label = CStr::from_bytes_until_nul(&self.label).unwrap_or_default();
-            let label = vk::DebugUtilsLabelEXT::default().label_name(label);
-            // SAFETY: V1, V3.
-            unsafe { debug_utils.cmd_begin_debug_utils_label(self.pass_commands, &label) };
-        }
+        self.record_label(self.pass_commands, name);
         self.stop_query = self.timer.as_mut().and_then(|timer| timer.record_start(self.pass_commands, name));
         Ok(())
     }
@@ -221,9 +222,25 @@ impl Recorder {
         if let (Some(timer), Some(query)) = (&self.timer, self.stop_query.take()) {
             timer.record_stamp(self.pass_commands, query);
         }
+        self.record_end_of_label(self.pass_commands);
+    }
+
+    /// Begins a named range of commands, for debuggers.
+    fn record_label(&mut self, commands: vk::CommandBuffer, name: &str) {
+        let Some(debug_utils) = self.device.debug_utils() else { return };
+        self.label.clear();
+        self.label.extend_from_slice(name.as_bytes());
+        self.label.push(0);
+        let label = CStr::from_bytes_until_nul(&self.label).unwrap_or_default();
+        let label = vk::DebugUtilsLabelEXT::default().label_name(label);
+        // SAFETY: V1, V3.
+        unsafe { debug_utils.cmd_begin_debug_utils_label(commands, &label) };
+    }
+
+    fn record_end_of_label(&self, commands: vk::CommandBuffer) {
         if let Some(debug_utils) = self.device.debug_utils() {
             // SAFETY: V1, V3.
-            unsafe { debug_utils.cmd_end_debug_utils_label(self.pass_commands) };
+            unsafe { debug_utils.cmd_end_debug_utils_label(commands) };
         }
     }
 
@@ -267,13 +284,24 @@ impl Recorder {
         }
         self.require_closed()?;
         if !self.uploads.is_empty() {
-            begin_commands(&self.device, self.upload_commands)?;
-            self.uploads.record(&self.device, self.upload_commands)?;
-            end_commands(&self.device, self.upload_commands)?;
+            let commands = self.upload_commands;
+            begin_commands(&self.device, commands)?;
+            self.record_label(commands, UPLOADS);
+            let stop_query = self.timer.as_mut().map(|timer| timer.record_start_of_uploads(commands));
+            self.uploads.record(&self.device, commands)?;
+            if let (Some(timer), Some(query)) = (&self.timer, stop_query) {
+                timer.record_stamp(commands, query);
+            }
+            self.record_end_of_label(commands);
+            end_commands(&self.device, commands)?;
         }
         if self.read_backs.has_copies() {
-            self.record_boundary(Scope::Transfer);
+            // The last pass keeps its name in errors: copies do not fail.
+            let last_pass = self.last_pass;
+            self.begin_pass(READ_BACKS, Scope::Transfer)?;
             self.read_backs.record(&self.device, self.pass_commands)?;
+            self.end_pass();
+            self.last_pass = last_pass;
         }
         if !self.read_backs.is_empty() {
             self.record_boundary(Scope::HostRead);
@@ -306,6 +334,15 @@ impl Recorder {
     /// The command buffers of the writes and of the passes.
     pub(super) fn command_buffers(&self) -> (vk::CommandBuffer, vk::CommandBuffer) {
         (self.upload_commands, self.pass_commands)
+    }
+
+    /// The name of the recorder.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn observers(&self) -> &[Arc<dyn SubmissionObserver>] {
+        &self.observers
     }
 
     pub(super) fn fence(&self) -> vk::Fence {

@@ -7,7 +7,7 @@ use ash::vk;
 use super::handle::Owned;
 use super::recorder::Recorder;
 use super::scope::{self, Scope};
-use super::{Device, call_failed, refused};
+use super::{Device, Submission, call_failed, refused};
 use crate::error::{Error, Result};
 
 impl Recorder {
@@ -21,8 +21,22 @@ impl Recorder {
         if !self.is_recording() {
             return Ok(());
         }
-        let outcome = self.finish_recording().and_then(|()| self.run()).and_then(|()| self.collect_times());
+        let outcome = self.finish_recording().and_then(|()| self.run_observed());
         self.clear();
+        outcome
+    }
+
+    /// Runs the command buffers and tells the observers.
+    fn run_observed(&mut self) -> Result<()> {
+        let device = Arc::clone(self.device());
+        let number = device.next_submission();
+        let submission = Submission { number, recorder: self.name() };
+        self.observers().iter().for_each(|observer| observer.before(&device, &submission));
+        let outcome = self.run().and_then(|()| self.collect_times());
+        let submission = Submission { number, recorder: self.name() };
+        let passes = if outcome.is_ok() { self.pass_times() } else { &[] };
+        // In the reverse order, so that the spans of observers nest.
+        self.observers().iter().rev().for_each(|observer| observer.after(&device, &submission, passes));
         outcome
     }
 
@@ -114,6 +128,7 @@ pub(super) fn end_commands(device: &Device, commands: vk::CommandBuffer) -> Resu
 pub(super) fn run_once(device: &Arc<Device>, name: &str, record: impl FnOnce(vk::CommandBuffer)) -> Result<()> {
     let pool = create_command_pool(device, name)?;
     let [commands] = allocate_command_buffers(&pool)?;
+    device.set_name(commands, name);
     begin_commands(device, commands)?;
     record(commands);
     end_commands(device, commands)?;

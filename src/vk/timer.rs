@@ -10,6 +10,12 @@ use crate::error::Result;
 
 /// Passes of one submission that are timed; later ones are not, so that the pool never has to grow while it is in use.
 const MAX_PASSES: u32 = 256;
+/// Queries of a pool.
+const QUERIES: u32 = 2 * MAX_PASSES + 2;
+/// Label of the copies from the staging buffer before the first pass.
+pub(super) const UPLOADS: &str = "uploads";
+/// Label of the copies to the staging buffer after the last pass.
+pub(super) const READ_BACKS: &str = "read-backs";
 
 /// Whether a recorder measures its passes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,11 +34,15 @@ pub struct PassTime {
     pub name: &'static str,
     /// Milliseconds on the device.
     pub ms: f64,
+    /// When it began, by the device's clock; [`super::DeviceLimits::ns_between`] tells what the ticks are.
+    pub start_ticks: u64,
 }
 
 /// The timestamps of one submission.
 pub(super) struct Timer {
+    /// Two queries for each pass, and two for the uploads, whose command buffer runs before that of the passes.
     pool: Owned<vk::QueryPool>,
+    has_uploads: bool,
     names: Vec<&'static str>,
     ticks: Vec<u64>,
     times: Vec<PassTime>,
@@ -40,22 +50,23 @@ pub(super) struct Timer {
 
 impl Timer {
     /// A timer, unless timing is off or the device has no timestamps.
-    pub(super) fn create(device: &Arc<Device>, timing: Timing) -> Result<Option<Self>> {
+    pub(super) fn create(device: &Arc<Device>, name: &str, timing: Timing) -> Result<Option<Self>> {
         if timing == Timing::Off || device.info().limits.timestamp_bits == 0 {
             return Ok(None);
         }
-        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_PASSES);
+        let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(QUERIES);
         // SAFETY: V1.
         let pool = unsafe { device.raw().create_query_pool(&info, None) }
             .map_err(|result| call_failed("creation of the timestamps", result))?;
-        let pool = Owned::new(device, pool, "pass timestamps");
-        Ok(Some(Self { pool, names: Vec::new(), ticks: Vec::new(), times: Vec::new() }))
+        let pool = Owned::new(device, pool, &format!("{name} timestamps"));
+        Ok(Some(Self { pool, has_uploads: false, names: Vec::new(), ticks: Vec::new(), times: Vec::new() }))
     }
 
     /// Forgets the last submission.
     pub(super) fn record_reset(&mut self, commands: vk::CommandBuffer) {
         self.names.clear();
         self.times.clear();
+        self.has_uploads = false;
         // SAFETY: V1, V2, V3.
         unsafe { self.pool.device().raw().cmd_reset_query_pool(commands, self.pool.get(), 0, 2 * MAX_PASSES) };
     }
@@ -71,6 +82,15 @@ impl Timer {
         Some(query + 1)
     }
 
+    /// Starts the clock of the uploads, in their own command buffer; returns the query that stops it.
+    pub(super) fn record_start_of_uploads(&mut self, commands: vk::CommandBuffer) -> u32 {
+        self.has_uploads = true;
+        // SAFETY: V1, V2, V3; what is reset here is not in the range that `record_reset` resets.
+        unsafe { self.pool.device().raw().cmd_reset_query_pool(commands, self.pool.get(), 2 * MAX_PASSES, 2) };
+        self.record_stamp(commands, 2 * MAX_PASSES);
+        2 * MAX_PASSES + 1
+    }
+
     /// Stops the clock of a pass.
     pub(super) fn record_stamp(&self, commands: vk::CommandBuffer, query: u32) {
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
@@ -80,21 +100,33 @@ impl Timer {
 
     /// Fetches the times of a submission that is over.
     pub(super) fn collect(&mut self) -> Result<()> {
-        if self.names.is_empty() {
+        if self.has_uploads {
+            self.fetch(2 * MAX_PASSES, &[UPLOADS])?;
+        }
+        let names = std::mem::take(&mut self.names);
+        let fetched = self.fetch(0, &names);
+        self.names = names;
+        fetched
+    }
+
+    /// Fetches the times of passes whose queries begin at `first`.
+    fn fetch(&mut self, first: u32, names: &[&'static str]) -> Result<()> {
+        if names.is_empty() {
             return Ok(());
         }
         let device = self.pool.device();
         self.ticks.clear();
-        self.ticks.resize(2 * self.names.len(), 0);
+        self.ticks.resize(2 * names.len(), 0);
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: V1, V2; every query asked for was written.
-        unsafe { device.raw().get_query_pool_results(self.pool.get(), 0, &mut self.ticks, flags) }
+        unsafe { device.raw().get_query_pool_results(self.pool.get(), first, &mut self.ticks, flags) }
             .map_err(|result| call_failed("vkGetQueryPoolResults", result))?;
         let limits = &device.info().limits;
-        let times = self.names.iter().zip(self.ticks.chunks_exact(2));
+        let times = names.iter().zip(self.ticks.chunks_exact(2));
         self.times.extend(times.map(|(&name, pair)| PassTime {
             name,
-            ms: elapsed_ms(pair[0], pair[1], limits.timestamp_bits, limits.timestamp_period_ns),
+            ms: limits.ns_between(pair[0], pair[1]).max(0.0) * 1e-6,
+            start_ticks: pair[0],
         }));
         Ok(())
     }
@@ -102,23 +134,5 @@ impl Timer {
     /// The times of the last submission, in the order of its passes.
     pub(super) fn times(&self) -> &[PassTime] {
         &self.times
-    }
-}
-
-/// Milliseconds between two timestamps of which only the low `bits` count.
-fn elapsed_ms(start: u64, end: u64, bits: u32, period_ns: f32) -> f64 {
-    let mask = u64::MAX >> (64 - bits.clamp(1, 64));
-    (end.wrapping_sub(start) & mask) as f64 * f64::from(period_ns) * 1e-6
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_counter_that_wraps_between_two_timestamps_still_gives_their_distance() {
-        assert_eq!(elapsed_ms(1_000, 3_000, 64, 1.0), 0.002);
-        assert_eq!(elapsed_ms((1 << 36) - 1_000, 1_000, 36, 1.0), 0.002);
-        assert_eq!(elapsed_ms(u64::MAX, 1_999_999, 64, 0.5), 1.0);
     }
 }

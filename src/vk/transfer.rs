@@ -20,7 +20,7 @@ const IMAGE_ALIGNMENT: usize = 16;
 /// A claim on bytes that a submission reads back; honoured by [`super::Recorder::read_into`] until the next recording.
 #[derive(Clone)]
 pub struct ReadTicket {
-    pub(super) submission: u64,
+    pub(super) recording: u64,
     pub(super) buffer: Option<Arc<Buffer>>,
     pub(super) offset: u64,
     pub(super) size_bytes: u64,

@@ -129,7 +129,8 @@ fn an_evaluator_with_timestamps_tells_the_time_of_its_passes_and_the_same_fitnes
         }
         assert_eq!(plain.evaluation(0), timed.evaluation(0));
         assert!(plain.pass_times().is_empty());
-        let names: Vec<&str> = timed.pass_times().iter().map(|time| time.name).collect();
+        let mut names: Vec<&str> = timed.pass_times().iter().map(|time| time.name).collect();
+        names.retain(|name| !["uploads", "read-backs"].contains(name));
         assert_eq!(names, ["zero sums", "evaluate"]);
         assert!(timed.pass_times().iter().all(|time| time.ms >= 0.0));
     });

@@ -9,6 +9,7 @@ use super::inputs::Found;
 use super::manifest::{ManifestRow, Outputs};
 use super::name::{Known, NameTemplate};
 use crate::app::destination::{Destination, place_of};
+use crate::app::inside::Tracer;
 use crate::app::options::{EvolveOptions, SchemeOptions};
 use crate::app::picture::SchemeName;
 use crate::error::{Error, Result};
@@ -30,9 +31,10 @@ pub(super) struct Item {
 }
 
 impl Item {
-    /// What `smalti evolve` would call the options of this picture.
-    pub(super) fn options(&self) -> EvolveOptions {
-        EvolveOptions { input: self.input.clone(), outputs: self.outputs.clone(), ..(*self.common).clone() }
+    /// What `smalti evolve` would call the options of this picture; work on it is told to `tracer`.
+    pub(super) fn options(&self, tracer: &Tracer) -> EvolveOptions {
+        let (input, outputs, tracer) = (self.input.clone(), self.outputs.clone(), tracer.clone());
+        EvolveOptions { input, outputs, tracer, ..(*self.common).clone() }
     }
 
     /// How it evolves.

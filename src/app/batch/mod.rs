@@ -1,5 +1,6 @@
 //! `smalti batch`: many pictures, one after the other or side by side, and what became of each.
 
+mod crew;
 mod existing;
 mod gate;
 mod inputs;
@@ -7,6 +8,7 @@ mod items;
 mod manifest;
 mod name;
 mod pipeline;
+mod queue;
 mod schedule;
 mod summary;
 mod threads;
@@ -31,8 +33,9 @@ use self::summary::Summary;
 use self::threads::IoThreads;
 use super::cli::{Cli, MessageArgs};
 use super::computing::{ComputingArgs, DevicesArg};
+use super::inside::{self, Tracer};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
-use super::options::{EvolveOptions, Verbosity};
+use super::options::{EvolveOptions, Overwrite, Verbosity};
 use super::picture::PictureArgs;
 use super::progress::Progress;
 use super::report::{self, Row, Status};
@@ -91,6 +94,9 @@ pub(super) struct BatchArgs {
     /// shard]
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub results: Option<PathBuf>,
+    /// Also write what threads and devices did when, as JSON for ui.perfetto.dev or chrome://tracing; changes no result
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub trace: Option<PathBuf>,
     /// Only list what would be done; write nothing
     #[arg(long, help_heading = "Output")]
     pub dry_run: bool,
@@ -160,6 +166,10 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
     if verbosity > Verbosity::Quiet && shard.is_some() {
         report::say(&format!("smalti: {} of {all} pictures are in this shard", items.len()));
     }
+    let tracer = match &args.trace {
+        Some(path) => inside::begin_trace(path, &[], Overwrite::Refuse)?,
+        None => Tracer::default(),
+    };
     computing.start_threads()?;
     let workers = threads::workers(args, &computing, items.len())?;
     if verbosity > Verbosity::Quiet {
@@ -174,8 +184,13 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
         schedule: &Schedule::new(&items),
         gate: &Gate::new(memory::share_of_free()),
         interrupt: &interrupt,
+        tracer: &tracer,
     };
+    workers.iter().for_each(|worker| inside::trace_device(&tracer, &worker.selected));
     let (summary, fatal) = watch(&pipeline, &mut journal, args);
+    if tracer.is_on() {
+        interrupt.while_writing(|| tracer.finish())?;
+    }
     if verbosity > Verbosity::Quiet {
         summary.print(&results);
     }

@@ -6,19 +6,22 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Scope;
 use std::time::Instant;
 
 use rayon::ThreadPool;
 
+use super::crew::Crew;
 use super::existing::{self, OnExists, Verdict};
 use super::gate::{Gate, Permit};
 use super::items::Item;
+use super::queue::Queue;
 use super::schedule::Schedule;
 use crate::app::destination::Destination;
 use crate::app::device::Selected;
+use crate::app::inside::Tracer;
 use crate::app::interrupt::Interrupt;
 use crate::app::options::EvolveOptions;
 use crate::app::outputs::{self, Drawn};
@@ -31,12 +34,47 @@ use crate::app::watch::Watchers;
 use crate::error::{Error, Result};
 use crate::output;
 
-/// What evolves pictures: a device, and the threads of each picture that evolves at the same time.
-///
-/// A pool for each picture: waiting for a share of work, a thread of a common one might begin another whole picture.
+/// Most pictures that wait to be evolved.
+const READ_AHEAD_MAX: usize = 16;
+
+/// What evolves pictures: a device, and how it does several at the same time.
 pub(super) struct Worker {
     pub selected: Selected,
-    pub pools: Vec<ThreadPool>,
+    pub in_flight: InFlight,
+}
+
+/// How pictures evolve at the same time.
+pub(super) enum InFlight {
+    /// The threads of each: waiting for a share of work, a thread of a common pool might begin another whole picture.
+    Pools(Vec<ThreadPool>),
+    /// At most so many, as lanes of the device.
+    Lanes(usize),
+}
+
+/// What a thread that evolves has at hand.
+enum Hands<'w> {
+    /// The threads for one picture after the other.
+    Pool(&'w ThreadPool),
+    /// A device for so many pictures at once.
+    Lanes(usize),
+}
+
+impl Worker {
+    /// Pictures that evolve at the same time.
+    fn in_flight(&self) -> usize {
+        match &self.in_flight {
+            InFlight::Pools(pools) => pools.len(),
+            InFlight::Lanes(count) => *count,
+        }
+    }
+
+    /// What each of its threads has at hand.
+    fn crews(&self) -> Vec<Hands<'_>> {
+        match &self.in_flight {
+            InFlight::Pools(pools) => pools.iter().map(Hands::Pool).collect(),
+            InFlight::Lanes(count) => vec![Hands::Lanes(*count)],
+        }
+    }
 }
 
 /// What all threads of a batch see.
@@ -50,6 +88,8 @@ pub(super) struct Pipeline<'a> {
     pub schedule: &'a Schedule,
     pub gate: &'a Gate,
     pub interrupt: &'a Interrupt,
+    /// Where all threads tell what they do.
+    pub tracer: &'a Tracer,
 }
 
 /// What comes out: a row for every picture that was not interrupted, and what else should be said.
@@ -61,44 +101,44 @@ pub(super) enum Told {
 }
 
 /// What there is to do about a picture.
-struct Work<'a> {
-    options: EvolveOptions,
-    prepared: Prepared,
+pub(super) struct Work<'a> {
+    pub options: EvolveOptions,
+    pub prepared: Prepared,
     to_write: Vec<Destination>,
     /// The memory that it may take, until it is saved.
     permit: Permit<'a>,
 }
 
 /// A picture that waits to be evolved.
-struct Ready<'a> {
-    item: &'a Item,
-    work: Work<'a>,
-    row: Row,
+pub(super) struct Ready<'a> {
+    pub item: &'a Item,
+    pub work: Work<'a>,
+    pub row: Row,
 }
 
 /// A picture that waits to be saved.
-struct Done<'a> {
-    ready: Ready<'a>,
-    ending: Ending,
-    drawn: Drawn,
+pub(super) struct Done<'a> {
+    pub ready: Ready<'a>,
+    pub ending: Ending,
+    pub drawn: Drawn,
 }
 
 impl<'a> Pipeline<'a> {
     /// Starts all threads; rows come as pictures are finished, and end when nothing is left.
     pub(super) fn start<'scope>(&'a self, scope: &'scope Scope<'scope, 'a>) -> Receiver<Told> {
-        let in_flight = self.workers.iter().map(|worker| worker.pools.len()).sum::<usize>().max(1);
+        let in_flight = self.workers.iter().map(Worker::in_flight).sum::<usize>().clamp(1, READ_AHEAD_MAX);
         let (told, rows) = channel();
         let (ready_in, ready_out) = sync_channel(in_flight);
         let (done_in, done_out) = sync_channel(self.io_threads.1);
-        let (ready_out, done_out) = (Arc::new(Mutex::new(ready_out)), Arc::new(Mutex::new(done_out)));
+        let (ready_out, done_out) = (Arc::new(Queue::new(ready_out)), Arc::new(Queue::new(done_out)));
         for _ in 0..self.io_threads.0 {
             let (ready, told) = (ready_in.clone(), told.clone());
             scope.spawn(move || self.read_all(&ready, &told));
         }
         for worker in self.workers {
-            for pool in &worker.pools {
+            for crew in worker.crews() {
                 let (ready, done, told) = (Arc::clone(&ready_out), done_in.clone(), told.clone());
-                scope.spawn(move || self.evolve_all((&worker.selected, pool), &ready, &done, &told));
+                scope.spawn(move || self.evolve_all((&worker.selected, crew), &ready, &done, &told));
             }
         }
         for _ in 0..self.io_threads.1 {
@@ -141,7 +181,7 @@ impl<'a> Pipeline<'a> {
             return Ok(None);
         }
         check_is_file(&item.input)?;
-        let options = item.options();
+        let options = item.options(self.tracer);
         let prepared = Prepared::load(&options, row)?;
         for warning in &prepared.job.warnings {
             let _ = told.send(Told::Warning(format!("{}: {warning}", item.input.display())));
@@ -161,34 +201,63 @@ impl<'a> Pipeline<'a> {
     /// What a thread that evolves does.
     fn evolve_all(
         &self,
-        (selected, pool): (&Selected, &ThreadPool),
-        ready: &Mutex<Receiver<Ready<'a>>>,
+        (selected, hands): (&Selected, Hands<'_>),
+        ready: &Queue<Ready<'a>>,
         done: &SyncSender<Done<'a>>,
         told: &Sender<Told>,
     ) {
-        while let Some(mut picture) = receive(ready) {
+        let pool = match hands {
+            Hands::Pool(pool) => Some(pool),
+            Hands::Lanes(in_flight) => {
+                let crew = Crew::muster((self, selected), in_flight, (done.clone(), told.clone()));
+                match crew.transpose() {
+                    Some(Ok(mut crew)) => return crew.work(ready),
+                    Some(Err(error)) => {
+                        let _ = told.send(Told::Fatal(error));
+                    }
+                    None => {}
+                }
+                None
+            }
+        };
+        while let Some(picture) = ready.take() {
             if self.interrupt.is_requested() {
                 self.schedule.end();
                 continue;
             }
-            let evolve = || {
-                let mut watchers = Watchers { interrupt: self.interrupt, recorder: None };
-                let Ready { work: Work { options, prepared, .. }, row, .. } = &mut picture;
-                row.device = Some(selected.label().to_owned());
-                pool.install(|| prepared.evolve(options, selected, &mut watchers, row))
-            };
-            match unless_it_panics(evolve) {
-                // What is not finished leaves nothing.
-                Ok(Evolved { ending, .. }) if ending.status == Status::Partial => self.schedule.end(),
-                Ok(Evolved { ending, drawn, .. }) => drop(done.send(Done { ready: picture, ending, drawn })),
-                Err(error) => self.fail(picture.row, error, told),
-            }
+            self.evolve_one((selected, pool), picture, done, told);
+        }
+    }
+
+    /// Evolves a picture to its end, on the threads of a pool.
+    pub(super) fn evolve_one(
+        &self,
+        (selected, pool): (&Selected, Option<&ThreadPool>),
+        mut picture: Ready<'a>,
+        done: &SyncSender<Done<'a>>,
+        told: &Sender<Told>,
+    ) {
+        let mut evolve = || {
+            let mut watchers = Watchers { interrupt: self.interrupt, recorder: None };
+            let Ready { work: Work { options, prepared, .. }, row, .. } = &mut picture;
+            row.device = Some(selected.label().to_owned());
+            prepared.evolve(options, selected, &mut watchers, row)
+        };
+        let evolved = unless_it_panics(|| match pool {
+            Some(pool) => pool.install(evolve),
+            None => evolve(),
+        });
+        match evolved {
+            // What is not finished leaves nothing.
+            Ok(Evolved { ending, .. }) if ending.status == Status::Partial => self.schedule.end(),
+            Ok(Evolved { ending, drawn, .. }) => drop(done.send(Done { ready: picture, ending, drawn })),
+            Err(error) => self.fail(picture.row, error, told),
         }
     }
 
     /// What a thread that saves does.
-    fn save_all(&self, done: &Mutex<Receiver<Done<'a>>>, told: &Sender<Told>) {
-        while let Some(Done { ready, ending, drawn }) = receive(done) {
+    fn save_all(&self, done: &Queue<Done<'a>>, told: &Sender<Told>) {
+        while let Some(Done { ready, ending, drawn }) = done.take() {
             let Ready { item, work: Work { prepared, to_write, permit, .. }, mut row } = ready;
             match unless_it_panics(|| self.save(&prepared, &to_write, (&ending, drawn), &mut row)) {
                 Ok(()) => {
@@ -210,6 +279,7 @@ impl<'a> Pipeline<'a> {
         row: &mut Row,
     ) -> Result<()> {
         let began = Instant::now();
+        let _span = self.tracer.span("save").tell("picture", row.id.as_str());
         let outputs: Vec<&Destination> = to_write.iter().collect();
         let files = outputs::encode(&outputs, drawn, &prepared.provenances.told(ending))?;
         for file in &files {
@@ -226,7 +296,7 @@ impl<'a> Pipeline<'a> {
     }
 
     /// Notes that a picture failed, and whether all others would.
-    fn fail(&self, mut row: Row, error: Error, told: &Sender<Told>) {
+    pub(super) fn fail(&self, mut row: Row, error: Error, told: &Sender<Told>) {
         row.note_failure(&error);
         row.output.clear();
         let is_fatal = matches!(error, Error::DeviceLost { .. }) || output::is_disk_full(&error);
@@ -242,10 +312,6 @@ fn tell(told: &Sender<Told>, row: Row) {
     let _ = told.send(Told::Row(Box::new(row)));
 }
 
-fn receive<T>(queue: &Mutex<Receiver<T>>) -> Option<T> {
-    queue.lock().unwrap_or_else(PoisonError::into_inner).recv().ok()
-}
-
 /// Refuses pipes and devices, which might never end: in a folder they are there by mistake.
 fn check_is_file(input: &Path) -> Result<()> {
     let is_special = input.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir());
@@ -253,7 +319,7 @@ fn check_is_file(input: &Path) -> Result<()> {
 }
 
 /// The result of some work on a picture, even if that panics: one picture must not end a batch.
-fn unless_it_panics<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(super) fn unless_it_panics<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
         let told = panic.downcast_ref::<&str>().map(ToString::to_string).or(panic.downcast_ref::<String>().cloned());
         Err(Error::Internal(format!("a picture made the program panic: {}", told.unwrap_or_default())))

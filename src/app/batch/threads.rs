@@ -3,7 +3,7 @@
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::BatchArgs;
-use super::pipeline::Worker;
+use super::pipeline::{InFlight, Worker};
 use crate::app::computing::Computing;
 use crate::app::device::Selected;
 use crate::app::options::in_range;
@@ -15,8 +15,8 @@ const IO_THREADS_MAX: usize = 64;
 const IO_THREADS_USUAL: usize = 8;
 /// Most pictures that evolve at the same time on a device.
 const IN_FLIGHT_MAX: u64 = 4_096;
-/// Pictures that evolve at the same time on a Vulkan device, unless asked otherwise.
-const IN_FLIGHT_ON_VULKAN: usize = 2;
+/// Most lanes of a Vulkan device unless somebody asks for more; its memory may hold fewer.
+const LANES_USUAL: usize = 256;
 
 /// Threads that read, and threads that save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,14 +51,17 @@ pub(super) fn workers(args: &BatchArgs, computing: &Computing, item_count: usize
     let devices = args.devices.select(computing)?;
     let share = item_count.div_ceil(devices.len()).max(1);
     let threads = (computing.thread_count() / devices.len()).max(1);
+    let most = |usual: usize| in_flight.map_or(usual, |count| count as usize).min(share);
     let worker = |selected: Selected| {
-        let usual = match selected {
-            Selected::Cpu { .. } => threads,
-            Selected::Vulkan { .. } => IN_FLIGHT_ON_VULKAN,
+        // A picture that the clock ends is alone on its device, or what it comes to would depend on its neighbours even more.
+        let lanes = matches!(selected, Selected::Vulkan { .. }) && args.picture.time.is_none();
+        let in_flight = if lanes {
+            InFlight::Lanes(most(LANES_USUAL))
+        } else {
+            let count = most(if matches!(selected, Selected::Cpu { .. }) { threads } else { 1 });
+            InFlight::Pools((0..count).map(|_| pool((threads / count).max(1))).collect::<Result<_>>()?)
         };
-        let in_flight = in_flight.map_or(usual, |count| count as usize).min(share);
-        let pools = (0..in_flight).map(|_| pool((threads / in_flight).max(1))).collect::<Result<_>>()?;
-        Ok(Worker { selected, pools })
+        Ok(Worker { selected, in_flight })
     };
     devices.into_iter().map(worker).collect()
 }

@@ -2,6 +2,7 @@
 
 mod compare;
 mod measure;
+mod passes;
 mod run;
 mod table;
 mod workload;
@@ -36,7 +37,8 @@ Measured, after a warm-up, as the median of as many repeats as fit into --time, 
                     step, from a population that 8 rounds have formed; births are those that were accepted
   picture           default runs at 512 px, from the decoded picture to the drawn mosaic; if --time is shorter
                     than a run, its search is extrapolated
-  pass              time on a Vulkan device, where it has timestamps
+  pass              time on a Vulkan device, where it has timestamps: of a full evaluation, and of a round of the
+                    search in cells in the style free with one child a step
 
 JSON (one object): schema is \"smalti-bench\", schema_version 1, version smalti's; picture (\"built-in\", or the
 SHA-256 of IN); time_ms; machine with os, architecture, cpu_count, threads, device, driver; measurements, each with

@@ -7,6 +7,7 @@ use indicatif::HumanCount;
 use serde_json::json;
 
 use super::measure::{Lap, Measurement, Unit, repeat};
+use super::passes;
 use super::workload::{self, Pictures, SIDES_PX};
 use crate::app::device::Selected;
 use crate::app::options::Verbosity;
@@ -35,8 +36,9 @@ const ROUNDS: u32 = 4;
 /// What is measured of the search in cells: style, candidates, and which of the sizes.
 const SEARCHES: [(&str, u32, usize); 5] =
     [("free", 1, 0), ("free", 8, 0), ("free", 1, 1), ("free", 8, 1), ("mosaic", 1, 1)];
-/// Steps of progress: evaluation and births in both sizes, births in batches, searches, a whole picture.
-const STEPS: usize = 2 * 2 + 1 + SEARCHES.len() + 1;
+/// Steps of progress: evaluation and births in both sizes, births in batches, searches, passes of two of them, a whole
+/// picture.
+const STEPS: usize = 2 * 2 + 1 + SEARCHES.len() + 2 + 1;
 
 /// Measures one device.
 pub(super) struct Bench<'a> {
@@ -84,8 +86,12 @@ impl<'a> Bench<'a> {
                 _ => form(&self.pictures.targets[size], &style)?,
             };
             let row = format!("cells {name}, K={candidates}, {} px", SIDES_PX[size]);
-            let done = self.search(row.clone(), course, &flies);
+            let done = self.search(row.clone(), course.clone(), &flies);
             self.unless_unable(done, &row, verbosity)?;
+            if (name, candidates) == ("free", 1) {
+                let done = self.passes(course, &flies, SIDES_PX[size]);
+                self.unless_unable(done, &format!("the passes of {row}"), verbosity)?;
+            }
             formed = Some((name, size, flies));
         }
         let row = format!("picture, {} px", SIDES_PX[1]);
@@ -175,6 +181,15 @@ impl<'a> Bench<'a> {
         let of = |which: usize| laps.iter().map(|lap| lap[which]).collect::<Vec<Lap>>();
         let evals = Measurement::of(name.clone(), Unit::EvalsPerS, &of(0));
         self.note([evals, Measurement::of(name, Unit::BirthsPerS, &of(1))]);
+        Ok(())
+    }
+
+    /// Makes rounds as [`Bench::search`], and looks at what each pass takes.
+    fn passes(&mut self, course: Course, flies: &[Fly], side_px: u32) -> Result<()> {
+        let passes = passes::of_rounds(self.selected, course, (flies, ROUNDS), self.budget)?;
+        let row =
+            |(name, laps): (&str, Vec<Lap>)| Measurement::of(format!("pass {name}, {side_px} px"), Unit::Ms, &laps);
+        self.note(passes.into_iter().map(row));
         Ok(())
     }
 

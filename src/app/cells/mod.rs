@@ -12,7 +12,7 @@ pub(super) use self::curve::CSV_HEADER;
 pub(super) use self::grout::GroutColor;
 use self::grout::{GroutChoice, grout_color};
 pub(super) use self::preset_file::PresetFile;
-pub(super) use self::work::search_job;
+pub(super) use self::work::{finish_search, search_job};
 use super::job::Job;
 use super::options::in_range;
 use super::picture::PictureArgs;

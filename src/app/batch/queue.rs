@@ -1,0 +1,48 @@
+//! What one stage hands to the threads of the next.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::{Mutex, PoisonError, TryLockError};
+
+/// The receiving end of a channel, for several threads.
+pub(super) struct Queue<T> {
+    receiver: Mutex<Receiver<T>>,
+    is_ended: AtomicBool,
+}
+
+impl<T> Queue<T> {
+    pub(super) fn new(receiver: Receiver<T>) -> Self {
+        Self { receiver: Mutex::new(receiver), is_ended: AtomicBool::new(false) }
+    }
+
+    /// The next, as soon as there is one; none if there will be no more.
+    pub(super) fn take(&self) -> Option<T> {
+        let next = self.receiver.lock().unwrap_or_else(PoisonError::into_inner).recv().ok();
+        if next.is_none() {
+            self.is_ended.store(true, Ordering::Relaxed);
+        }
+        next
+    }
+
+    /// The next, if there is one now; none, too, while another thread waits, which will have it.
+    pub(super) fn take_if_ready(&self) -> Option<T> {
+        let receiver = match self.receiver.try_lock() {
+            Ok(receiver) => receiver,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return None,
+        };
+        match receiver.try_recv() {
+            Ok(next) => Some(next),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => {
+                self.is_ended.store(true, Ordering::Relaxed);
+                None
+            }
+        }
+    }
+
+    /// Whether there will be no more, as far as anybody found out.
+    pub(super) fn is_ended(&self) -> bool {
+        self.is_ended.load(Ordering::Relaxed)
+    }
+}
