@@ -149,8 +149,9 @@ fn a_plan_counts_by_items_and_by_minutes_and_refuses_what_it_decides_itself() {
         ("x --shards 0", "--shards 0: must be 1 to"),
         ("x --minutes 0", "--minutes 0: must be more than 0"),
         ("x --shards 2 --per-shard 2", "cannot be used with"),
-        ("x --shards 2 --shard 1/2", "--shard: a plan says that"),
-        ("x --shards 2 --results r.jsonl", "--results: a plan says that"),
+        ("x --shards 2 --shard 1/2", "--shard: each shard has"),
+        ("x --shards 2 --results r.jsonl", "--results: each shard has"),
+        ("x --shards 2 --trace t.json", "--trace: each shard has"),
         ("x --shards 2 --style cubist", "cubist"),
     ] {
         let ran = plan(rest);

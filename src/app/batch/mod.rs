@@ -252,7 +252,7 @@ impl Planned {
 
     /// How it would be evolved.
     pub(super) fn options(&self) -> EvolveOptions {
-        self.0.options()
+        self.0.options(&Tracer::default())
     }
 }
 

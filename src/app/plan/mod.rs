@@ -124,9 +124,13 @@ fn write(args: &PlanArgs, cli: &Cli) -> Result<()> {
 
 /// Refuses flags of `smalti batch` that a plan decides.
 fn refuse_flags(batch: &BatchArgs) -> Result<()> {
-    let given = [("--shard", batch.shard.is_some()), ("--results", batch.results.is_some())];
+    let given = [
+        ("--shard", batch.shard.is_some()),
+        ("--results", batch.results.is_some()),
+        ("--trace", batch.trace.is_some()),
+    ];
     given.into_iter().find(|(_, is_given)| *is_given).map_or(Ok(()), |(flag, _)| {
-        Err(Error::Usage(format!("{flag}: a plan says that for each of its shards; drop the flag")))
+        Err(Error::Usage(format!("{flag}: each shard has one of its own; drop the flag, or give it to smalti batch")))
     })
 }
 
