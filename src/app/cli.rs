@@ -13,8 +13,10 @@ use super::computing::ComputingArgs;
 use super::gallery::GalleryArgs;
 use super::inside::InsideArgs;
 use super::manual::{CompletionsArgs, ManArgs};
+use super::merge::MergeArgs;
 use super::paper::PaperArgs;
 use super::picture::PictureArgs;
+use super::plan::PlanArgs;
 use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
@@ -39,7 +41,7 @@ pub struct Cli {
     config: Option<PathBuf>,
     /// What was typed, the name of the program first, and what the file of `--config` added to it.
     #[arg(skip)]
-    typed: Vec<OsString>,
+    pub(super) typed: Vec<OsString>,
 }
 
 impl Cli {
@@ -92,11 +94,14 @@ impl Cli {
         let (before, after) = self.typed.split_at(end);
         let tokens = before.iter().cloned().chain(flags.iter().map(OsString::from)).chain(after.iter().cloned());
         // Given twice, the last one counts.
-        let command = Self::command().mut_subcommand("batch", |batch| batch.args_override_self(true));
+        let command = ["batch", "plan"]
+            .into_iter()
+            .fold(Self::command(), |cli, name| cli.mut_subcommand(name, |command| command.args_override_self(true)));
         let wrong = |error: clap::Error| Error::Usage(one_sentence(&error.to_string(), "smalti batch"));
         let matches = command.try_get_matches_from(tokens).map_err(wrong)?;
         match Self::from_arg_matches(&matches).map_err(wrong)?.command {
             Command::Batch(args) => Ok(args.picture),
+            Command::Plan(args) => Ok(args.batch.picture),
             _ => Err(Error::Internal("a batch was typed as another command".to_owned())),
         }
     }
@@ -153,6 +158,12 @@ pub(super) enum Command {
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed with
     /// numpy, scipy and scikit-image. Of an animation the first frame is measured.
     Score(ScoreArgs),
+    /// Cut a batch into shards, with scripts that run them on Slurm, Kubernetes, or GNU parallel
+    Plan(Box<PlanArgs>),
+    /// Put the results of several shards or runs together
+    ///
+    /// Tells which pictures failed, and which are missing.
+    Merge(MergeArgs),
     /// Measure how fast this machine evolves pictures
     Bench(BenchArgs),
     /// Print what a shell needs to complete commands and flags

@@ -22,11 +22,13 @@ mod job;
 mod look;
 mod manual;
 mod memory;
+mod merge;
 mod options;
 mod outputs;
 mod paper;
 mod picture;
 mod pipelines;
+mod plan;
 mod prepared;
 mod presets;
 mod progress;
@@ -62,6 +64,8 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
+        cli::Command::Plan(args) => plan::plan(args, cli),
+        cli::Command::Merge(args) => merge::merge(args),
         cli::Command::Bench(args) => bench::bench(args),
         cli::Command::Completions(args) => manual::completions(args),
         cli::Command::Man(args) => manual::man(args),

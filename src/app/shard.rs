@@ -205,6 +205,34 @@ fn usage(sentence: &str) -> Error {
 /// Items without a group go to the shards in turn, after the groups, the largest first, each to the shard that has least so
 /// far. It depends on the order of the items and on nothing else, so callers must sort them the same way everywhere.
 pub(super) fn assign(groups: &[Option<&str>], shard: Shard) -> Vec<usize> {
+    divide(groups, shard.count).swap_remove(shard.index as usize - 1)
+}
+
+/// The items of each of `count` shards, as [`assign`] gives them.
+pub(super) fn divide(groups: &[Option<&str>], count: u32) -> Vec<Vec<usize>> {
+    let mut units = units(groups);
+    // A stable sort: units of one size keep the order of their first items.
+    units.sort_by_key(|unit| Reverse(unit.len()));
+    let mut loads: BinaryHeap<Reverse<(usize, usize)>> = (0..count as usize).map(|index| Reverse((0, index))).collect();
+    let mut shards = vec![Vec::new(); count as usize];
+    for unit in units {
+        let Some(Reverse((load, index))) = loads.pop() else { break };
+        loads.push(Reverse((load + unit.len(), index)));
+        shards[index].extend(unit);
+    }
+    for shard in &mut shards {
+        shard.sort_unstable();
+    }
+    shards
+}
+
+/// How many shards can have an item.
+pub(super) fn unit_count(groups: &[Option<&str>]) -> u32 {
+    u32::try_from(units(groups).len()).unwrap_or(u32::MAX)
+}
+
+/// The items that stay together, in the order of their first ones.
+fn units(groups: &[Option<&str>]) -> Vec<Vec<usize>> {
     let mut units: Vec<Vec<usize>> = Vec::new();
     let mut unit_of_group: HashMap<&str, usize> = HashMap::new();
     for (item, group) in groups.iter().enumerate() {
@@ -214,19 +242,7 @@ pub(super) fn assign(groups: &[Option<&str>], shard: Shard) -> Vec<usize> {
         }
         units[unit].push(item);
     }
-    // A stable sort: units of one size keep the order of their first items.
-    units.sort_by_key(|unit| Reverse(unit.len()));
-    let mut loads: BinaryHeap<Reverse<(usize, u32)>> = (1..=shard.count).map(|index| Reverse((0, index))).collect();
-    let mut mine = Vec::new();
-    for unit in units {
-        let Some(Reverse((load, index))) = loads.pop() else { break };
-        loads.push(Reverse((load + unit.len(), index)));
-        if index == shard.index {
-            mine.extend(unit);
-        }
-    }
-    mine.sort_unstable();
-    mine
+    units
 }
 
 #[cfg(test)]

@@ -36,6 +36,7 @@ mod score;
 mod shader_manifest;
 mod shaders_fresh;
 mod shapes;
+mod shards;
 mod snapshots;
 mod spirv;
 mod styles_vulkan;

@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use super::inputs::Found;
-use super::manifest::ManifestRow;
+use super::manifest::{ManifestRow, Outputs};
 use super::name::{Known, NameTemplate};
 use crate::app::destination::{Destination, place_of};
 use crate::app::inside::Tracer;
@@ -27,6 +27,8 @@ pub(super) struct Item {
     pub after: Option<String>,
     /// What it has in common with others.
     common: Arc<EvolveOptions>,
+    /// All that is said of it, as a row that needs neither folders nor names beside it.
+    pub row: ManifestRow,
 }
 
 impl Item {
@@ -105,7 +107,8 @@ pub(super) fn gather(
         let relative = relative_of(&row.input);
         drafts.push(Draft { row, relative, common });
     }
-    let ids = ids(&drafts)?;
+    let named: Vec<(&ManifestRow, &Path)> = drafts.iter().map(|draft| (&draft.row, draft.relative.as_path())).collect();
+    let ids = ids(&named)?;
     let finish = |(index, (draft, id)): (usize, (Draft, String))| finish(draft, id, index, naming);
     let items = drafts.into_iter().zip(ids).enumerate().map(finish).collect::<Result<Vec<Item>>>()?;
     check_places(&items)?;
@@ -122,18 +125,17 @@ fn relative_of(input: &Path) -> PathBuf {
 
 /// The ids: as in the manifest, or else the path below the folder that was named, without its ending where that is still unlike
 /// all others.
-fn ids(drafts: &[Draft]) -> Result<Vec<String>> {
-    let short = |draft: &Draft| spelt(draft.relative.with_extension("").as_os_str());
-    let given = |draft: &Draft| draft.row.id.clone();
+fn ids(named: &[(&ManifestRow, &Path)]) -> Result<Vec<String>> {
+    let short = |relative: &Path| spelt(relative.with_extension("").as_os_str());
     let mut counts: HashMap<String, usize> = HashMap::new();
-    for draft in drafts {
-        *counts.entry(given(draft).unwrap_or_else(|| short(draft))).or_default() += 1;
+    for (row, relative) in named {
+        *counts.entry(row.id.clone().unwrap_or_else(|| short(relative))).or_default() += 1;
     }
     let mut taken = HashSet::new();
-    let id = |draft: &Draft| {
-        let id = given(draft).unwrap_or_else(|| match short(draft) {
+    let id = |&(row, relative): &(&ManifestRow, &Path)| {
+        let id = row.id.clone().unwrap_or_else(|| match short(relative) {
             id if counts.get(&id) == Some(&1) => id,
-            _ => spelt(draft.row.input.as_os_str()),
+            _ => spelt(row.input.as_os_str()),
         });
         if taken.insert(id.clone()) {
             Ok(id)
@@ -141,7 +143,17 @@ fn ids(drafts: &[Draft]) -> Result<Vec<String>> {
             Err(Error::Usage(format!("two pictures have the id {id}; give each row of the manifest an id of its own")))
         }
     };
-    drafts.iter().map(id).collect()
+    named.iter().map(id).collect()
+}
+
+/// The ids that the pictures of a manifest have in a batch of these rows alone.
+///
+/// # Errors
+/// [`Error::Usage`] if two have the same.
+pub(super) fn ids_of_rows(rows: &[ManifestRow]) -> Result<Vec<String>> {
+    let relatives: Vec<PathBuf> = rows.iter().map(|row| relative_of(&row.input)).collect();
+    let named: Vec<(&ManifestRow, &Path)> = rows.iter().zip(relatives.iter().map(PathBuf::as_path)).collect();
+    ids(&named)
 }
 
 fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result<Item> {
@@ -164,7 +176,9 @@ fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result
     if outputs.is_empty() {
         return Err(Error::Usage(format!("{id}: has no output; name one")));
     }
-    Ok(Item { id, input: row.input, outputs, group: row.group, after: row.after, common })
+    let row = ManifestRow { id: Some(id.clone()), output: Some(Outputs::Several(paths)), ..row };
+    let (input, group, after) = (row.input.clone(), row.group.clone(), row.after.clone());
+    Ok(Item { id, input, outputs, group, after, common, row })
 }
 
 /// Refuses outputs in the place of an input or of one another.

@@ -25,6 +25,7 @@ use self::existing::OnExists;
 use self::gate::Gate;
 use self::inputs::Depth;
 use self::items::{Item, Naming};
+pub(super) use self::manifest::ManifestRow;
 use self::name::NameTemplate;
 use self::pipeline::{Pipeline, Told};
 use self::schedule::Schedule;
@@ -33,13 +34,14 @@ use self::threads::IoThreads;
 use super::cli::{Cli, MessageArgs};
 use super::computing::{ComputingArgs, DevicesArg};
 use super::destination::place_of;
+use super::inside::{self, Tracer};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::options::{EvolveOptions, Overwrite, Verbosity};
 use super::picture::PictureArgs;
 use super::progress::Progress;
 use super::report::{self, Row, Status};
 use super::shard::{self, ShardChoice};
-use super::{inside, memory, values};
+use super::{memory, values};
 use crate::error::{Error, Result};
 use crate::output::{self, Journal};
 use crate::vk::Validation;
@@ -269,6 +271,38 @@ fn check_formats(formats: &[String]) -> Result<Vec<String>> {
         return Err(Error::Usage(format!("--format: {twice} is named twice")));
     }
     Ok(formats)
+}
+
+/// A picture of a batch, for plans.
+pub(super) struct Planned(Item);
+
+impl Planned {
+    /// All that a manifest must say of it.
+    pub(super) fn row(&self) -> &ManifestRow {
+        &self.0.row
+    }
+
+    /// How it would be evolved.
+    pub(super) fn options(&self) -> EvolveOptions {
+        self.0.options(&Tracer::default())
+    }
+}
+
+/// The pictures that a batch would evolve.
+///
+/// # Errors
+/// As those of the batch, before it begins.
+pub(super) fn planned(args: &BatchArgs, cli: &Cli) -> Result<Vec<Planned>> {
+    Ok(find(args, cli)?.into_iter().map(Planned).collect())
+}
+
+/// The ids of the pictures of a manifest, in its order.
+///
+/// # Errors
+/// As [`manifest::read`].
+pub(super) fn ids(path: &Path) -> Result<Vec<String>> {
+    let rows: Vec<ManifestRow> = manifest::read(path)?.into_iter().map(|(_, row)| row).collect();
+    items::ids_of_rows(&rows)
 }
 
 /// Makes the output folder, takes away what killed processes left in it, and opens the file of the results.

@@ -1,0 +1,217 @@
+//! Result rows read back, and which one of several about the same picture counts.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::error::{Error, Result};
+
+/// A row of results.
+#[derive(Clone, Debug)]
+pub(super) struct ResultRow {
+    pub told: Told,
+    /// The row as it was written, without the end of its line.
+    pub line: String,
+    /// The name of the file that it is from.
+    pub file_name: String,
+}
+
+/// The parts of a row that a merge looks at; the others are passed on as they are.
+#[derive(Clone, Debug, Deserialize)]
+pub(super) struct Told {
+    pub id: String,
+    pub status: String,
+    #[serde(default)]
+    pub shard: Option<String>,
+    #[serde(default)]
+    pub evolve_ms: f64,
+    #[serde(default)]
+    pub error: Option<String>,
+}
+
+impl Told {
+    /// Whether the picture is there, whole.
+    pub(super) fn is_success(&self) -> bool {
+        matches!(self.status.as_str(), "complete" | "unchanged" | "skipped")
+    }
+}
+
+/// The rows that count, one of each picture, by its id.
+#[derive(Debug, Default)]
+pub(super) struct Rows {
+    by_id: HashMap<String, ResultRow>,
+}
+
+impl Rows {
+    /// Takes in the rows of a file; returns a sentence about each line that is no row.
+    ///
+    /// Of the rows of one picture in one file the last counts; of those in several files one that tells of a success, else
+    /// that of the file that was read last.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the file cannot be read, or has lines of which none is a row.
+    pub(super) fn read(&mut self, path: &Path) -> Result<Vec<String>> {
+        let bytes = fs::read(path).map_err(|error| Error::input(path, unreadable(&error)))?;
+        let file_name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut last_of_id = HashMap::new();
+        let mut warnings = Vec::new();
+        for (number, line) in (1..).zip(bytes.split(|&byte| byte == b'\n')) {
+            let line = line.trim_ascii();
+            if line.is_empty() {
+                continue;
+            }
+            if let Some((told, line)) = row(line) {
+                let row = ResultRow { told, line, file_name: file_name.to_string() };
+                last_of_id.insert(row.told.id.clone(), row);
+            } else {
+                let path = path.display();
+                warnings.push(format!("{path}: line {number} is no whole row, as after a kill, and is skipped"));
+            }
+        }
+        // One torn line may be all that a process left which was killed at its first picture.
+        if last_of_id.is_empty() && warnings.len() > 1 {
+            return Err(Error::input(
+                path,
+                "holds no rows of results; name a file that smalti batch wrote, as results.jsonl",
+            ));
+        }
+        last_of_id.into_values().for_each(|row| self.take(row));
+        Ok(warnings)
+    }
+
+    /// Takes in what a later file says of a picture.
+    fn take(&mut self, row: ResultRow) {
+        let known = self.by_id.get(&row.told.id);
+        if known.is_none_or(|known| row.told.is_success() || !known.told.is_success()) {
+            self.by_id.insert(row.told.id.clone(), row);
+        }
+    }
+
+    /// Whether there is a row of this picture.
+    pub(super) fn contains(&self, id: &str) -> bool {
+        self.by_id.contains_key(id)
+    }
+
+    /// All rows in the natural order of their ids: `2` before `10`.
+    pub(super) fn sorted(self) -> Vec<ResultRow> {
+        let mut rows: Vec<ResultRow> = self.by_id.into_values().collect();
+        rows.sort_by(|a, b| {
+            let (a, b) = (&a.told.id, &b.told.id);
+            natord::compare(a, b).then_with(|| a.cmp(b))
+        });
+        rows
+    }
+}
+
+fn row(line: &[u8]) -> Option<(Told, String)> {
+    let line = std::str::from_utf8(line).ok()?;
+    let told = serde_json::from_str(line).ok()?;
+    Some((told, line.to_owned()))
+}
+
+/// Whether a line is a row of results.
+pub(super) fn is_row(line: &str) -> bool {
+    row(line.as_bytes()).is_some()
+}
+
+fn unreadable(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file; name results that smalti batch wrote".to_owned(),
+        _ => format!("cannot be read ({error})"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use tempfile::TempDir;
+
+    use super::*;
+
+    fn line(id: &str, status: &str, evolve_ms: f64) -> String {
+        format!(r#"{{"id":"{id}","status":"{status}","evolve_ms":{evolve_ms},"anything":[1]}}"#)
+    }
+
+    /// A folder with these files, and their paths in the same order.
+    fn files(contents: &[String]) -> (TempDir, Vec<PathBuf>) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let paths: Vec<PathBuf> =
+            (0..contents.len()).map(|number| folder.path().join(format!("{number}.jsonl"))).collect();
+        for (path, content) in paths.iter().zip(contents) {
+            fs::write(path, content).expect("the folder is ours");
+        }
+        (folder, paths)
+    }
+
+    /// The ids with the status that counts, and the warnings.
+    fn merged(contents: &[String]) -> (Vec<(String, String)>, Vec<String>) {
+        let (_folder, paths) = files(contents);
+        let mut rows = Rows::default();
+        let warnings = paths.iter().flat_map(|path| rows.read(path).expect("it holds rows")).collect();
+        let rows = rows.sorted().into_iter();
+        (rows.map(|row| (row.told.id, row.told.status)).collect(), warnings)
+    }
+
+    fn expected(rows: &[(&str, &str)]) -> Vec<(String, String)> {
+        rows.iter().map(|&(id, status)| (id.to_owned(), status.to_owned())).collect()
+    }
+
+    #[test]
+    fn the_last_row_of_a_picture_counts_in_one_file() {
+        let file = [
+            line("a", "complete", 1.0),
+            line("b", "failed", 1.0),
+            line("a", "failed", 2.0),
+            line("b", "complete", 3.0),
+        ];
+        assert_eq!(merged(&[file.join("\n")]).0, expected(&[("a", "failed"), ("b", "complete")]));
+    }
+
+    #[test]
+    fn a_success_in_one_file_beats_a_failure_in_another_whichever_comes_first() {
+        let (good, bad) = (line("a", "unchanged", 0.0), line("a", "failed", 0.0));
+        for contents in [[good.clone(), bad.clone()], [bad.clone(), good.clone()]] {
+            assert_eq!(merged(&contents).0, expected(&[("a", "unchanged")]));
+        }
+        // What a file says in the end is what it says: its own earlier success is void, that of another file is not.
+        let contents = [good.clone(), [line("a", "complete", 0.0), bad.clone()].join("\n")];
+        assert_eq!(merged(&contents).0, expected(&[("a", "unchanged")]));
+        let contents = [line("a", "complete", 0.0), good];
+        assert_eq!(merged(&contents).0, expected(&[("a", "unchanged")]), "of two successes the later file's");
+        let contents = [line("a", "partial", 0.0), bad];
+        assert_eq!(merged(&contents).0, expected(&[("a", "failed")]), "of two failures the later file's");
+    }
+
+    #[test]
+    fn ids_are_sorted_as_people_count() {
+        let ids = ["b", "a10", "a9", "a01", "a1", "A"];
+        let file = ids.map(|id| line(id, "complete", 0.0)).join("\n");
+        let sorted: Vec<String> = merged(&[file]).0.into_iter().map(|(id, _)| id).collect();
+        assert_eq!(sorted, ["A", "a01", "a1", "a9", "a10", "b"]);
+    }
+
+    #[test]
+    fn a_torn_line_is_skipped_with_a_warning_and_the_others_count() {
+        let whole = [line("a", "complete", 0.0), line("b", "complete", 0.0)].join("\n");
+        let (rows, warnings) = merged(&[format!("{whole}\n{}", &line("c", "complete", 0.0)[..20])]);
+        assert_eq!(rows, expected(&[("a", "complete"), ("b", "complete")]));
+        assert_eq!(warnings.len(), 1);
+        assert!(warnings[0].contains("0.jsonl: line 3 is no whole row"), "{warnings:?}");
+        // All that a process left which was killed at once, and nothing at all.
+        assert_eq!(merged(&["{\"id\":\"a".to_owned(), String::new()]).1.len(), 1);
+    }
+
+    #[test]
+    fn a_file_without_any_row_is_refused_by_its_name() {
+        let (_folder, paths) = files(&["first line\nsecond line\n".to_owned()]);
+        let refusal = Rows::default().read(&paths[0]).expect_err("it is prose");
+        assert_eq!(refusal.exit_code(), 2);
+        assert!(refusal.to_string().contains("0.jsonl: holds no rows"), "{refusal}");
+        let refusal = Rows::default().read(Path::new("no/such.jsonl")).expect_err("it is not there");
+        assert!(refusal.to_string().contains("there is no such file"), "{refusal}");
+    }
+}
