@@ -14,6 +14,7 @@ use super::picture::PictureArgs;
 use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
+use super::video::VideoArgs;
 use super::{report, values};
 
 /// Evolves pictures into mosaics of thousands of tiles.
@@ -75,6 +76,10 @@ pub(super) enum Command {
     ///
     /// Thousands of coloured tiles are bred, child by child, until together they look like the picture. The same picture, options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Evolve a sequence of pictures into mosaics whose tiles move instead of flickering
+    ///
+    /// Each frame begins with the tiles of the one before, and what holds still in the pictures holds still in the mosaics. The same command goes on where it was ended.
+    Video(Box<VideoArgs>),
     /// Draw a population again, at any size, or write it in another format
     ///
     /// At the size at which it evolved the picture is the one that `evolve` wrote.

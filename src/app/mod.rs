@@ -13,6 +13,8 @@ mod curve_file;
 mod destination;
 mod device;
 mod devices;
+mod film;
+mod flicker;
 mod gallery;
 mod interrupt;
 mod job;
@@ -39,6 +41,7 @@ mod snapshots;
 mod study;
 mod timelapse;
 mod values;
+mod video;
 mod watch;
 
 use std::process::ExitCode;
@@ -56,6 +59,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Paper(args) => paper::make(args),
         cli::Command::Gallery(args) => gallery::make(args),
         cli::Command::Score(args) => score::score(args),
+        cli::Command::Video(args) => video::make(args),
         cli::Command::Bench(args) => bench::bench(args),
     }
 }

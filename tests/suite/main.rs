@@ -37,6 +37,7 @@ mod styles_vulkan;
 mod timelapse;
 mod translucent_search;
 mod transparency;
+mod video;
 mod vulkan;
 mod vulkan_failures;
 mod workshop;
