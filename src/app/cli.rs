@@ -20,6 +20,7 @@ use super::plan::PlanArgs;
 use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
+use super::video::VideoArgs;
 use super::{config, report, values};
 use crate::error::{Error, Result};
 
@@ -137,6 +138,10 @@ pub(super) enum Command {
     ///
     /// One bad picture never stops the others: the reason is in its line of the results, and the exit code is 3.
     Batch(Box<BatchArgs>),
+    /// Evolve a sequence of pictures into mosaics whose tiles move instead of flickering
+    ///
+    /// Each frame begins with the tiles of the one before, and what holds still in the pictures holds still in the mosaics. The same command goes on where it was ended.
+    Video(Box<VideoArgs>),
     /// Draw a population again, at any size, or write it in another format
     ///
     /// At the size at which it evolved the picture is the one that `evolve` wrote.

@@ -15,6 +15,8 @@ mod curve_file;
 mod destination;
 mod device;
 mod devices;
+mod film;
+mod flicker;
 mod gallery;
 mod inside;
 mod interrupt;
@@ -46,6 +48,7 @@ mod snapshots;
 mod study;
 mod timelapse;
 mod values;
+mod video;
 mod watch;
 
 use std::process::ExitCode;
@@ -66,6 +69,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         cli::Command::Score(args) => score::score(args),
         cli::Command::Plan(args) => plan::plan(args, cli),
         cli::Command::Merge(args) => merge::merge(args),
+        cli::Command::Video(args) => video::make(args),
         cli::Command::Bench(args) => bench::bench(args),
         cli::Command::Completions(args) => manual::completions(args),
         cli::Command::Man(args) => manual::man(args),

@@ -173,6 +173,18 @@ impl Provenance {
         Self { decisive, key }
     }
 
+    /// The provenance of what `more` decides, too, or decides instead.
+    pub(super) fn with(&self, more: Map<String, Value>) -> Self {
+        let mut decisive = self.decisive.clone();
+        decisive.extend(more);
+        Self::of(decisive)
+    }
+
+    /// Something that decides the result.
+    pub(super) fn decisive(&self, word: &str) -> &Value {
+        &self.decisive[word]
+    }
+
     /// SHA-256 over everything that decides the result, 64 lower-case hexadecimal digits.
     pub(super) fn key(&self) -> &str {
         &self.key

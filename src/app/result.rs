@@ -46,7 +46,7 @@ pub(super) fn draw(
 }
 
 /// How far a mosaic is from its target where tiles are wanted.
-fn difference(pixels: &[Rgb], target: &Target) -> Difference {
+pub(super) fn difference(pixels: &[Rgb], target: &Target) -> Difference {
     let Some(transparent) = target.transparent() else { return Difference::between(pixels, target.pixels()) };
     let wanted = |pixels: &[Rgb]| -> Vec<Rgb> {
         let wanted = pixels.iter().zip(transparent).filter(|&(_, &is_transparent)| !is_transparent);

@@ -6,14 +6,14 @@ use std::process::ExitCode;
 use clap::Args;
 use serde::Serialize;
 
-use super::{report, values};
+use super::{flicker, report, values};
 use crate::error::{Error, Result};
 use crate::metrics::{Picture, Reference, Score};
 use crate::model::Rgb;
 use crate::photo::{self, Background, Photo, ReadOptions};
 
 /// Exit code when some of the pictures could not be scored.
-const EXIT_SOME_FAILED: u8 = 3;
+pub(super) const EXIT_SOME_FAILED: u8 = 3;
 
 const AFTER_HELP: &str = "\
 Columns (more in --json: MAE_R, MAE_G, MAE_B, EDGE_P, EDGE_R, width, height):
@@ -24,23 +24,36 @@ Columns (more in --json: MAE_R, MAE_G, MAE_B, EDGE_P, EDGE_R, width, height):
   EDGE  how well edges are kept: F1 of the Canny edges of luma, found again within 2 px;
         EDGE_P is precision, EDGE_R is recall
 
+With --flicker, REF and OUT are folders of frames in natural order, and the columns are, over all neighbouring frames:
+  FLICKER  mean of |OUT[t] - OUT[t-1]| over the channels of pixels of which no channel of REF changes by more than --still
+  STILL    the share of such pixels
+  CHANGE   mean of |(OUT[t] - OUT[t-1]) - (REF[t] - REF[t-1])| over the channels of all pixels
+  SAE, MAE of OUT to REF, over all frames
+
 Exit codes: 0 all were scored, 2 none could be, 3 some could not be.
 
 Examples:
   smalti evolve photo.jpg -o mosaic.png --save-target target.png
   smalti score target.png mosaic.png
   smalti score target.png a.png b.png c.jpg --json > scores.json
+  smalti score --flicker frames mosaic-frames
   smalti score logo.png mosaic.png --background white";
 
 #[derive(Debug, Args)]
 #[command(after_long_help = AFTER_HELP)]
 pub(super) struct ScoreArgs {
-    /// Picture to compare with, 7x7 px at least
+    /// Picture to compare with, 7x7 px at least; with --flicker a folder of frames
     #[arg(value_name = "REF")]
     pub reference: PathBuf,
-    /// Pictures to score, of the same size
+    /// Pictures to score, of the same size; with --flicker folders of frames
     #[arg(value_name = "OUT", required = true)]
     pub pictures: Vec<PathBuf>,
+    /// Measure how much sequences of frames change where the reference does not
+    #[arg(long)]
+    pub flicker: bool,
+    /// Largest change of a channel of REF, 0 to 255, of a pixel that counts as still
+    #[arg(long, value_name = "T", default_value_t = 12, requires = "flicker")]
+    pub still: u8,
     /// Print a JSON array to stdout, one object for each OUT that could be scored, instead of a table
     #[arg(long)]
     pub json: bool,
@@ -110,6 +123,9 @@ impl Row {
 
 /// Scores the pictures; the exit code of the process.
 pub(super) fn score(args: &ScoreArgs) -> ExitCode {
+    if args.flicker {
+        return flicker::score(args);
+    }
     match score_all(args) {
         Ok(exit_code) => exit_code,
         Err(error) => {
@@ -149,7 +165,7 @@ fn score_one(reference: &Reference<'_>, path: &Path, background: Rgb) -> Result<
 }
 
 /// Reads a picture, and says what was ignored in it.
-fn read(path: &Path, background: Rgb) -> Result<Photo> {
+pub(super) fn read(path: &Path, background: Rgb) -> Result<Photo> {
     let loaded = photo::read(path, &ReadOptions { background: Background::Color(background), long_side_px: None })?;
     for warning in &loaded.warnings {
         report::error(&format!("{}: {warning}", path.display()));

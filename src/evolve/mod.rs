@@ -8,6 +8,7 @@ pub mod cells;
 pub mod color;
 pub mod evolution;
 pub mod first;
+pub mod held;
 pub mod palette;
 pub mod restart;
 pub mod scheme;

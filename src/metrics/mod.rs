@@ -6,12 +6,14 @@
 
 mod difference;
 mod edges;
+mod flicker;
 mod gradient;
 mod luma;
 mod similarity;
 
 pub use difference::Difference;
 pub use edges::EdgeMatch;
+pub use flicker::Flicker;
 pub use gradient::GradientSimilarity;
 
 use edges::EdgeMap;

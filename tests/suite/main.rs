@@ -44,6 +44,7 @@ mod timelapse;
 mod trace;
 mod translucent_search;
 mod transparency;
+mod video;
 mod vulkan;
 mod vulkan_failures;
 mod workshop;

@@ -1,25 +1,21 @@
 //! What `smalti timelapse` was asked to do.
 
-use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::frames::Spacing;
 use crate::app::cli::ProgressKind;
 use crate::app::computing::{Computing, ComputingArgs};
-use crate::app::destination;
+use crate::app::film::{AnimationFile, AnimationFormat, FRAMES_PER_S_MAX};
 use crate::app::options::{Overwrite, in_range};
 use crate::app::values;
 use crate::error::{Error, Result};
 use crate::model::Rgb;
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::output;
 use crate::photo::{GIF_FRAMES_PER_S_MAX, Timing};
 use crate::vk::Validation;
 
-/// Most frames a second.
-const FRAMES_PER_S_MAX: u64 = 120;
 /// Longest time in seconds that the last frame may be shown: 16 bits count hundredths.
 const HOLD_S_MAX: f64 = 600.0;
 
@@ -75,25 +71,6 @@ pub(in crate::app) struct TimelapseArgs {
     /// Say nothing but errors
     #[arg(short, long, help_heading = "Messages")]
     pub quiet: bool,
-}
-
-/// How an animation is encoded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum AnimationFormat {
-    Apng,
-    Gif,
-    /// H.264, by ffmpeg.
-    Mp4,
-    /// VP9, by ffmpeg.
-    WebM,
-}
-
-/// A file to write.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct AnimationFile {
-    /// The path as the user wrote it.
-    pub path: PathBuf,
-    pub format: AnimationFormat,
 }
 
 /// Everything that `smalti timelapse` was asked to do.
@@ -160,43 +137,5 @@ impl TimelapseOptions {
             last_cs: self.hold_cs,
             plays: self.plays,
         }
-    }
-
-    /// Checks that every output can be written, and none is named twice or is a device or a pipe, which cannot be gone back
-    /// in.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] or [`Error::Output`].
-    pub(super) fn check_outputs(&self) -> Result<()> {
-        for (index, output) in self.outputs.iter().enumerate() {
-            let path = output.path.display();
-            let place = destination::place_of(&output.path);
-            if self.outputs[..index].iter().any(|other| destination::place_of(&other.path) == place) {
-                return Err(Error::Usage(format!("{path} is named twice as an output")));
-            }
-            if output.path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-                return Err(Error::Usage(format!("{path} is a device or a pipe; name a file for the animation")));
-            }
-            output::check_writable(&output.path)?;
-        }
-        Ok(())
-    }
-}
-
-impl AnimationFile {
-    fn new(path: &Path) -> Result<Self> {
-        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
-        let format = match extension.as_str() {
-            "png" | "apng" => AnimationFormat::Apng,
-            "gif" => AnimationFormat::Gif,
-            "mp4" => AnimationFormat::Mp4,
-            "webm" => AnimationFormat::WebM,
-            _ => {
-                let path = path.display();
-                let sentence = format!("{path}: an animation must end in .png, .apng, .gif, .mp4 or .webm");
-                return Err(Error::Usage(sentence));
-            }
-        };
-        Ok(Self { path: path.to_owned(), format })
     }
 }

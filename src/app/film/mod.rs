@@ -1,18 +1,26 @@
-//! One output of a timelapse while it grows: a temporary file, and what encodes into it.
+//! Animations from populations: `timelapse` shows those of one evolution, `video` those of a sequence.
+
+mod apart;
+mod ffmpeg;
+mod file;
+mod provenance;
+mod studio;
 
 use std::fs::File;
 use std::io::{self, BufWriter};
 
-use super::ffmpeg::{Codec, Ffmpeg};
-use super::options::{AnimationFile, AnimationFormat};
-use super::provenance::AnimationProvenance;
+pub(super) use self::apart::take_apart;
+use self::ffmpeg::{Codec, Ffmpeg};
+pub(super) use self::file::{AnimationFile, AnimationFormat, FRAMES_PER_S_MAX, check_writable};
+pub(super) use self::provenance::{AnimationProvenance, check_replaceable};
+pub(super) use self::studio::{End, Shown, Studio, shoot};
 use crate::error::{Error, Result};
 use crate::model::{Canvas, Mosaic};
 use crate::output::PartialFile;
 use crate::photo::{ApngEncoder, GifEncoder, Timing};
 
 /// An animation that grows frame by frame. Dropped before its end, it leaves nothing.
-pub(super) struct Film {
+pub(in crate::app) struct Film {
     encoder: Encoder,
     // After the encoder, which may still write to it.
     file: PartialFile,
@@ -29,7 +37,7 @@ impl Film {
     ///
     /// # Errors
     /// [`Error::Output`] if it cannot be written, or the program that it needs is missing.
-    pub(super) fn open(
+    pub(in crate::app) fn open(
         output: &AnimationFile,
         canvas: &Canvas,
         timing: Timing,
@@ -58,7 +66,7 @@ impl Film {
     ///
     /// # Errors
     /// [`Error::Output`].
-    pub(super) fn add(&mut self, frame: &Mosaic) -> Result<()> {
+    pub(in crate::app) fn add(&mut self, frame: &Mosaic) -> Result<()> {
         let failed = |error: io::Error| self.file.failure(&error);
         match &mut self.encoder {
             Encoder::Apng(encoder) => encoder.add(&frame.pixels).map_err(failed),
@@ -71,7 +79,7 @@ impl Film {
     ///
     /// # Errors
     /// [`Error::Output`].
-    pub(super) fn finish(self) -> Result<PartialFile> {
+    pub(in crate::app) fn finish(self) -> Result<PartialFile> {
         let Self { encoder, file } = self;
         let finished: Result<(), Error> = match encoder {
             Encoder::Apng(encoder) => encoder.finish().map_err(|error| file.failure(&error)),

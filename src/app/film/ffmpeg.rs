@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::thread::JoinHandle;
 
-use super::options::AnimationFile;
+use super::AnimationFile;
 use crate::app::child::in_its_own_group;
 use crate::error::{Error, Result};
 use crate::model::Mosaic;

@@ -1,0 +1,145 @@
+//! `smalti video`: a sequence of pictures into a sequence of mosaics whose tiles move instead of flickering.
+//!
+//! Each frame is evolved from the population of the one before. Populations are kept, so the same command goes on where an
+//! earlier one was ended, and a shot can be made alone: its frames depend on nothing before it.
+
+mod film;
+mod frame;
+mod input;
+mod options;
+mod plan;
+mod show;
+mod store;
+
+use std::process::ExitCode;
+
+use self::frame::Shooter;
+use self::options::VideoOptions;
+use self::plan::Planned;
+use self::show::{FrameRow, Totals, Watcher};
+use self::store::Store;
+use super::interrupt::Interrupt;
+use super::options::Verbosity;
+use super::picture::SchemeName;
+use super::progress::Progress;
+use super::report::{self, Row, Status};
+use super::{destination, film as animation};
+use crate::error::{Error, Result};
+
+pub(super) use self::input::in_folder as frames_in;
+pub(super) use self::options::VideoArgs;
+
+/// Makes the frames, and reports about them; the exit code of the process.
+pub(super) fn make(args: &VideoArgs) -> ExitCode {
+    if args.shots {
+        return report::exit_code(VideoOptions::new(args).and_then(|options| print_shots(&options, args.json)));
+    }
+    let mut totals = Totals { id: "total", status: "failed", ..Totals::default() };
+    let done = VideoOptions::new(args).and_then(|options| shoot_all(&options, args, &mut totals));
+    if let Err(error) = &done {
+        totals.error = Some(error.to_string());
+        totals.status = if matches!(error, Error::Interrupted) { "partial" } else { "failed" };
+        report::error(&error.to_string());
+    }
+    let printed = if args.json { report::print_json(&totals) } else { Ok(()) };
+    if let Err(error) = &printed {
+        report::error(&error.to_string());
+    }
+    match done.and(printed) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => ExitCode::from(error.exit_code()),
+    }
+}
+
+fn print_shots(options: &VideoOptions, is_json: bool) -> Result<()> {
+    options.pictures.computing.start_threads()?;
+    let folder = tempfile::tempdir()
+        .map_err(|error| Error::Internal(format!("there is no place for temporary files ({error})")))?;
+    let frames = input::find(&options.inputs, folder.path())?;
+    plan::print_shots(&plan::plan(options, &frames.paths)?, is_json)
+}
+
+/// The work, in order: find and read the frames, check what is there, make what is missing, show it.
+fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> Result<()> {
+    let interrupt = Interrupt::listen()?;
+    options.pictures.computing.start_threads()?;
+    animation::check_writable(&options.films)?;
+    let store = Store::new(options);
+    let frames = input::find(&options.inputs, &options.populations.join("input"))?;
+    check_places(options, &frames.paths)?;
+    let selected = options.pictures.computing.select()?;
+    if options.pictures.verbosity > Verbosity::Quiet {
+        report::say_device(&selected);
+    }
+    let planned = plan::plan(options, &frames.paths)?;
+    store.check(&planned)?;
+    film::check_replaceable(options, &planned, frames.frames_per_s)?;
+    store.create()?;
+    totals.frames_planned = planned.len();
+    totals.shots = planned.chunk_by(|one, other| one.shot == other.shot).count();
+
+    let mut shooter = Shooter::open(options, &planned, &store, &selected)?;
+    let mut watcher = Watcher::begin(&interrupt, Progress::new(options.progress), planned.len());
+    let made = planned.iter().try_for_each(|frame| {
+        interrupt.check()?;
+        watcher.evals = frame.evals;
+        let mut row = Row::new(&frame.input, args.picture.seed, SchemeName::Cells);
+        row.device = Some(selected.label().to_owned());
+        row.tiles = Some(frame.tiles);
+        row.key = Some(if options.folder.is_some() { frame.picture.key() } else { frame.population.key() }.to_owned());
+        let is_kept = make_frame(&mut shooter, &store, (frame, &mut watcher), &mut row)?;
+        let row = FrameRow { row: &row, frame: frame.number, begin: frame.begin, shot: frame.shot, is_kept };
+        totals.note(&row);
+        if args.json { report::print_json(&row) } else { Ok(()) }
+    });
+    watcher.finish();
+    totals.wall_ms = report::milliseconds(watcher.elapsed());
+    made?;
+    drop(shooter);
+    totals.output = film::make(options, &planned, (&store, &selected, frames.frames_per_s), &interrupt)?;
+    totals.status = "complete";
+    totals.wall_ms = report::milliseconds(watcher.elapsed());
+    if options.pictures.verbosity > Verbosity::Quiet {
+        totals.say(&planned, options.folder.as_ref().map(|folder| folder.display().to_string()));
+    }
+    Ok(())
+}
+
+/// Makes one frame, or what is missing of it; whether it was all there.
+fn make_frame(
+    shooter: &mut Shooter<'_>,
+    store: &Store,
+    (frame, watcher): (&Planned, &mut Watcher<'_>),
+    row: &mut Row,
+) -> Result<bool> {
+    let is_whole = store.whole_population(frame).is_some();
+    let is_kept = is_whole && store.has_picture(frame)?;
+    if is_whole {
+        shooter.redraw(frame, watcher, row)?;
+    } else {
+        shooter.shoot(frame, watcher, row)?;
+        watcher.evolved += 1;
+    }
+    watcher.done += 1;
+    row.status = Status::Complete;
+    if row.output.is_empty() {
+        row.output = store.destinations(frame.number)?.iter().map(|one| one.path.display().to_string()).collect();
+    }
+    Ok(is_kept)
+}
+
+/// Refuses to write frames among those that are read.
+fn check_places(options: &VideoOptions, inputs: &[std::path::PathBuf]) -> Result<()> {
+    let places = options.folder.iter().chain([&options.populations]).map(|folder| destination::place_of(folder));
+    let places: Vec<_> = places.collect();
+    let of_input = inputs.iter().filter_map(|input| input.parent()).map(|folder| {
+        let folder = if folder.as_os_str().is_empty() { std::path::Path::new(".") } else { folder };
+        destination::place_of(folder)
+    });
+    match of_input.into_iter().find(|folder| places.contains(folder)) {
+        Some(folder) => {
+            Err(Error::Usage(format!("{} holds the frames that are read; name another folder", folder.display())))
+        }
+        None => Ok(()),
+    }
+}
