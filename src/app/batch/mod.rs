@@ -23,7 +23,7 @@ use clap::Args;
 
 use self::existing::OnExists;
 use self::gate::Gate;
-use self::inputs::Depth;
+use self::inputs::{Depth, Givers};
 use self::items::{Item, Naming};
 pub(super) use self::manifest::ManifestRow;
 use self::name::NameTemplate;
@@ -233,8 +233,9 @@ fn find(args: &BatchArgs, cli: &Cli) -> Result<Vec<Item>> {
     let formats = check_formats(&args.formats)?;
     let naming = Naming { folder: &args.output, template: &args.name, formats: &formats };
     let items = items::gather(found, (manifest, rows), &options_with, &naming)?;
+    let givers = Givers::new(&args.inputs, depth, &args.output);
     for output in items.iter().flat_map(|item| &item.outputs) {
-        if let Some(folder) = inputs::giver_of(&output.path, &args.inputs, (depth, &args.output)) {
+        if let Some(folder) = givers.of(&output.path) {
             return Err(Error::Usage(format!(
                 "{} would be taken for a picture of {} by the next run; name an output folder elsewhere or below it",
                 output.path.display(),
