@@ -3,7 +3,6 @@
 mod crew;
 mod existing;
 mod gate;
-mod inputs;
 mod items;
 mod manifest;
 mod name;
@@ -23,7 +22,6 @@ use clap::Args;
 
 use self::existing::OnExists;
 use self::gate::Gate;
-use self::inputs::{Depth, Givers};
 use self::items::{Item, Naming};
 pub(super) use self::manifest::ManifestRow;
 use self::name::NameTemplate;
@@ -34,6 +32,7 @@ use self::threads::IoThreads;
 use super::cli::{Cli, MessageArgs};
 use super::computing::{ComputingArgs, DevicesArg};
 use super::destination::place_of;
+use super::inputs::{self, Depth, Givers};
 use super::inside::{self, Tracer};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::options::{EvolveOptions, Overwrite, Verbosity};

@@ -1,4 +1,4 @@
-//! Which files a batch takes: folders, globs and single files, in natural order.
+//! Which pictures a command takes: folders, globs and single files, in natural order.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -56,6 +56,20 @@ pub(super) fn find(named: &[PathBuf], depth: Depth, outputs: &Path) -> Result<Ve
     let mut seen = HashSet::new();
     found.retain(|one: &Found| seen.insert(one.path.clone()));
     Ok(found)
+}
+
+/// The pictures in a folder, but not below it, in natural order.
+///
+/// # Errors
+/// [`Error::Input`] if it cannot be read, or holds none.
+pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    list(folder, Path::new(""), (Depth::Flat, Path::new("")), &mut found)
+        .map_err(|error| Error::input(folder, photo::why_unreadable(&error)))?;
+    if found.is_empty() {
+        return Err(Error::input(folder, "holds no pictures; name another folder"));
+    }
+    Ok(found.into_iter().map(|one| one.path).collect())
 }
 
 /// The pictures in `folder`, and with [`Depth::Recursive`] in those below it: first its own, then folder by folder. A folder with
@@ -152,7 +166,7 @@ fn matches(pattern: &str, outputs: &Path) -> Result<Vec<Found>> {
     Ok(found)
 }
 
-fn is_named_like_a_picture(path: &Path) -> bool {
+pub(super) fn is_named_like_a_picture(path: &Path) -> bool {
     let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
     ENDINGS.contains(&ending.as_str())
 }
