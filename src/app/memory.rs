@@ -1,5 +1,7 @@
 //! Whether the work fits into memory, found out before it begins.
 
+use std::path::{Path, PathBuf};
+
 use crate::error::{Error, Result};
 use crate::model::{Backdrop, Blend, Canvas, Population, Tile};
 
@@ -62,8 +64,7 @@ pub(super) fn search_bytes(pixel_count: u64, blend: Blend) -> u64 {
 
 /// The bytes that a batch may take: four fifths of what is free now, or all if that is not known.
 pub(super) fn share_of_free() -> u64 {
-    let free = std::fs::read_to_string("/proc/meminfo").ok().and_then(|told| available_bytes(&told));
-    free.map_or(u64::MAX, |bytes| bytes / 5 * 4)
+    free_bytes().map_or(u64::MAX, |bytes| bytes / 5 * 4)
 }
 
 /// Refuses what needs more memory than there is; passes where that is not known.
@@ -71,8 +72,7 @@ pub(super) fn share_of_free() -> u64 {
 /// # Errors
 /// [`Error::TooLarge`].
 pub(super) fn check(needed_bytes: u64) -> Result<()> {
-    let available_bytes = std::fs::read_to_string("/proc/meminfo").ok().and_then(|told| available_bytes(&told));
-    check_against(needed_bytes, available_bytes)
+    check_against(needed_bytes, free_bytes())
 }
 
 fn check_against(needed_bytes: u64, available_bytes: Option<u64>) -> Result<()> {
@@ -84,6 +84,40 @@ fn check_against(needed_bytes: u64, available_bytes: Option<u64>) -> Result<()> 
         ))),
         _ => Ok(()),
     }
+}
+
+/// The memory that is free: of the machine, or less if a scheduler or a container grants less.
+fn free_bytes() -> Option<u64> {
+    let of_machine = std::fs::read_to_string("/proc/meminfo").ok().and_then(|told| available_bytes(&told));
+    let groups = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    of_machine.into_iter().chain(granted_bytes(&groups, Path::new("/sys/fs/cgroup"))).min()
+}
+
+/// What is left of the memory that the control groups of a process grant it, as `groups`, its `/proc/self/cgroup`, names them
+/// below `root`; none if they set no limit.
+fn granted_bytes(groups: &str, root: &Path) -> Option<u64> {
+    let left = |(folder, limit, used): (PathBuf, &str, &str)| {
+        let number = |name: &str| std::fs::read_to_string(folder.join(name)).ok()?.trim().parse::<u64>().ok();
+        let stat = std::fs::read_to_string(folder.join("memory.stat")).unwrap_or_default();
+        // Files that were read a while ago make room by themselves.
+        let cached = stat.lines().find_map(|line| line.strip_prefix("inactive_file ")?.parse().ok()).unwrap_or(0);
+        Some(number(limit)?.saturating_sub(number(used)?.saturating_sub(cached)))
+    };
+    let of_line = |line: &str| {
+        let mut parts = line.splitn(3, ':').skip(1);
+        let (controllers, path) = (parts.next()?, parts.next()?.trim_start_matches('/'));
+        // Of version 2 is the group without controllers; inside a container its files lie at the root.
+        let (root, limit, used) = match controllers {
+            "" => (root.to_owned(), "memory.max", "memory.current"),
+            "memory" => (root.join("memory"), "memory.limit_in_bytes", "memory.usage_in_bytes"),
+            _ => return None,
+        };
+        let within = |folder: &&Path| folder.starts_with(&root);
+        let group = root.join(path);
+        let folders = group.ancestors().take_while(within).map(|folder| (folder.to_owned(), limit, used));
+        folders.filter_map(left).min()
+    };
+    groups.lines().filter_map(of_line).min()
 }
 
 /// The memory that Linux could give out without swapping.
@@ -103,6 +137,26 @@ mod tests {
         let meminfo = "MemTotal:       24689124 kB\nMemFree:  1 kB\nMemAvailable:   23000000 kB\nBuffers: 2 kB\n";
         assert_eq!(available_bytes(meminfo), Some(23_000_000 * 1024));
         assert_eq!(available_bytes("MemTotal: 1 kB\n"), None);
+    }
+
+    #[test]
+    fn the_tightest_control_group_counts_and_none_without_a_limit() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        let write = |name: &str, text: &str| {
+            let path = root.path().join(name);
+            std::fs::create_dir_all(path.parent().expect("it is below the root")).expect("the folder is ours");
+            std::fs::write(path, text).expect("the folder is ours");
+        };
+        write("job/step/memory.max", "max\n");
+        write("job/step/memory.current", "7\n");
+        assert_eq!(granted_bytes("0::/job/step\n", root.path()), None);
+        write("job/memory.max", "1000\n");
+        write("job/memory.current", "400\n");
+        write("job/memory.stat", "anon 300\ninactive_file 60\n");
+        assert_eq!(granted_bytes("0::/job/step\n", root.path()), Some(660));
+        write("memory/old/memory.limit_in_bytes", "500\n");
+        write("memory/old/memory.usage_in_bytes", "600\n");
+        assert_eq!(granted_bytes("4:cpu:/x\n3:memory:/old\n0::/job/step\n", root.path()), Some(0));
     }
 
     #[test]

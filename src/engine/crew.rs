@@ -36,8 +36,6 @@ struct Member {
 }
 
 /// Searches in the lanes of a device. Each comes to the bytes that [`crate::evolve::cells::run`] comes to, whatever searches beside it.
-///
-/// Two crews on threads of their own keep a device busy while either of them is at work on the host.
 pub struct SearchCrew {
     lanes: Box<dyn SearchLanes>,
     members: Vec<Member>,
@@ -60,6 +58,11 @@ impl SearchCrew {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.members.is_empty()
+    }
+
+    /// How far each search has come, in the order of their admission.
+    pub fn standings(&self) -> impl Iterator<Item = Standing> {
+        self.members.iter().map(|member| self.lanes.standing(member.lane))
     }
 
     /// Takes in a search, from `first` if there are flies to begin with, under a number of the caller's; false if there is no room before

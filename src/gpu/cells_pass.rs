@@ -155,7 +155,8 @@ impl CellsPass {
     pub fn arrange(&mut self, teams: &[Team]) -> Result<()> {
         const STEMS: [&str; 4] = ["cells_deal", "cells_scan", "cells_scatter", "cells_sort"];
         let mut stages: Vec<Stage> = STEMS.map(Stage::new).into();
-        let mut steps = [Stage::new("cells"), Stage::new("cells_fitness"), Stage::new("cells_fitness")];
+        const STEPS: [&str; 4] = ["cells", "cells_glazed", "cells_fitness", "cells_fitness"];
+        let mut steps = STEPS.map(Stage::new);
         for team in teams {
             let flies = team.most(|(_, fly_count)| (*fly_count as u64).div_ceil(ITEMS_PER_GROUP));
             let pixels = team.most(|(plan, _)| plan.block_count());
@@ -164,18 +165,13 @@ impl CellsPass {
             }
             let crowd = if team.lanes.len() == 1 { Crowd::One } else { Crowd::Many };
             let Steps { cells, fitness, .. } = self.steps_of(team.variant, crowd)?;
-            steps[0].add(team, cells, team.most(|(plan, _)| u64::from(plan.cell_count)));
+            let step = usize::from(team.variant.is_translucent);
+            steps[step].add(team, cells, team.most(|(plan, _)| u64::from(plan.cell_count)));
             if let Some([begin, add]) = fitness {
-                steps[1].add(team, begin, flies);
-                steps[2].add(team, add, pixels);
+                steps[2].add(team, begin, flies);
+                steps[3].add(team, add, pixels);
             }
         }
-        let translucent = teams.iter().filter(|team| team.variant.is_translucent).count();
-        steps[0].name = match translucent {
-            0 => "cells",
-            count if count == teams.len() => "cells_glazed",
-            _ => "cells, cells_glazed",
-        };
         stages.extend(steps);
         stages.retain(|stage| !stage.dispatches.is_empty());
         self.stages = stages;

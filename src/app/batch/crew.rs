@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 use std::sync::mpsc::{Sender, SyncSender};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::pipeline::{Done, Pipeline, Ready, Told, unless_it_panics};
 use super::queue::Queue;
@@ -32,8 +32,20 @@ pub(super) struct Crew<'a, 'p> {
     aboard: HashMap<u64, (Ready<'a>, Instant)>,
     /// The next one, for which there was no room yet.
     held: Option<Ready<'a>>,
+    /// Whether there is none until a picture is done.
+    is_full: bool,
     tickets: u64,
+    counted: Counted,
 }
+
+/// When the counters of the trace were written, and the evals of all pictures aboard then.
+struct Counted {
+    at: Instant,
+    evals: u64,
+}
+
+/// Between two values of a counter.
+const COUNTER_LEAST: Duration = Duration::from_millis(50);
 
 /// What became of a picture that was to come aboard.
 enum Admitted {
@@ -50,8 +62,20 @@ impl<'a, 'p> Crew<'a, 'p> {
         (done, told): (SyncSender<Done<'a>>, Sender<Told>),
     ) -> Result<Option<Self>> {
         let Some((searches, evolutions)) = selected.crews()? else { return Ok(None) };
-        let (aboard, held) = (HashMap::new(), None);
-        Ok(Some(Self { pipeline, selected, in_flight, done, told, searches, evolutions, aboard, held, tickets: 0 }))
+        Ok(Some(Self {
+            pipeline,
+            selected,
+            in_flight,
+            done,
+            told,
+            searches,
+            evolutions,
+            aboard: HashMap::new(),
+            held: None,
+            is_full: false,
+            tickets: 0,
+            counted: Counted { at: Instant::now(), evals: 0 },
+        }))
     }
 
     /// Evolves all pictures of the queue.
@@ -61,6 +85,7 @@ impl<'a, 'p> Crew<'a, 'p> {
             if let Err(error) = worked {
                 return self.give_up(error);
             }
+            self.count();
             if self.pipeline.interrupt.is_requested() {
                 return self.abandon(queue);
             }
@@ -72,7 +97,7 @@ impl<'a, 'p> Crew<'a, 'p> {
 
     /// Takes pictures aboard until there is no room, or none is ready; waits for one only if there is nothing else to do.
     fn fill(&mut self, queue: &Queue<Ready<'a>>) -> Result<()> {
-        while self.aboard.len() < self.in_flight {
+        while self.aboard.len() < self.in_flight && !self.is_full {
             let next = match self.held.take() {
                 Some(held) => Some(held),
                 None if self.aboard.is_empty() => queue.take(),
@@ -89,6 +114,11 @@ impl<'a, 'p> Crew<'a, 'p> {
 
     fn admit(&mut self, mut picture: Ready<'a>) -> Result<Admitted> {
         let ticket = self.tickets;
+        if picture.work.options.time_limit.is_some() {
+            // Alone, or what it comes to by the clock would depend on its neighbours even more.
+            self.pipeline.evolve_one((self.selected, None), picture, &self.done, &self.told);
+            return Ok(Admitted::Aboard);
+        }
         picture.row.device = Some(self.selected.label().to_owned());
         match self.begin(ticket, &picture) {
             Ok(true) => {
@@ -98,6 +128,7 @@ impl<'a, 'p> Crew<'a, 'p> {
             }
             Ok(false) => {
                 self.held = Some(picture);
+                self.is_full = true;
                 Ok(Admitted::Later)
             }
             Err(error @ Error::DeviceLost { .. }) => Err(error),
@@ -157,12 +188,30 @@ impl<'a, 'p> Crew<'a, 'p> {
         Ok(())
     }
 
+    /// Writes how many pictures are aboard, and how fast they evolve, into the trace if there is one.
+    fn count(&mut self) {
+        let elapsed = self.counted.at.elapsed();
+        if !self.pipeline.tracer.is_on() || elapsed < COUNTER_LEAST {
+            return;
+        }
+        let births: u64 = self.evolutions.evolutions().map(|(_, evolution)| evolution.outcome().births).sum();
+        let evals = births + self.searches.standings().map(|standing| standing.evals).sum::<u64>();
+        // Who leaves takes evals along.
+        if evals >= self.counted.evals {
+            let per_s = (evals - self.counted.evals) as f64 / elapsed.as_secs_f64();
+            self.pipeline.tracer.counter("evals/s", per_s);
+        }
+        self.pipeline.tracer.counter("pictures", self.aboard.len() as f64);
+        self.counted = Counted { at: Instant::now(), evals };
+    }
+
     /// Draws a picture that is done, and hands it to those that save.
     fn send_on(
         &mut self,
         (mut picture, began): (Ready<'a>, Instant),
         finish: impl FnOnce(&mut Ready<'a>, &mut dyn Evaluator) -> Result<(Ending, Drawn)>,
     ) -> Result<()> {
+        self.is_full = false;
         picture.row.evolve_ms = report::milliseconds(began.elapsed());
         let _span = self.pipeline.tracer.span("finish").tell("picture", picture.row.id.as_str());
         let finished = unless_it_panics(|| finish(&mut picture, self.evolutions.evaluator()));

@@ -20,7 +20,7 @@ use super::items::Item;
 use super::queue::Queue;
 use super::schedule::Schedule;
 use crate::app::destination::Destination;
-use crate::app::device::Selected;
+use crate::app::device::{Selected, why_no_vulkan};
 use crate::app::inside::Tracer;
 use crate::app::interrupt::Interrupt;
 use crate::app::options::EvolveOptions;
@@ -213,19 +213,19 @@ impl<'a> Pipeline<'a> {
         done: &SyncSender<Done<'a>>,
         told: &Sender<Told>,
     ) {
-        let pool = match hands {
-            Hands::Pool(pool) => Some(pool),
-            Hands::Lanes(in_flight) => {
-                let crew = Crew::muster((self, selected), in_flight, (done.clone(), told.clone()));
-                match crew.transpose() {
-                    Some(Ok(mut crew)) => return crew.work(ready),
-                    Some(Err(error)) => {
-                        let _ = told.send(Told::Fatal(error));
-                    }
-                    None => {}
+        let on_cpu = Selected::Cpu { reason: None };
+        let (selected, pool) = match hands {
+            Hands::Pool(pool) => (selected, Some(pool)),
+            Hands::Lanes(in_flight) => match Crew::muster((self, selected), in_flight, (done.clone(), told.clone())) {
+                Ok(Some(mut crew)) => return crew.work(ready),
+                Ok(None) => (selected, None),
+                // Nobody asked for the device: the CPU comes to the same bytes.
+                Err(error) if !selected.is_asked_for() => {
+                    let _ = told.send(Told::Warning(format!("computing on the CPU, since {}", why_no_vulkan(&error))));
+                    (&on_cpu, None)
                 }
-                None
-            }
+                Err(error) => return drop(told.send(Told::Fatal(error))),
+            },
         };
         while let Some(picture) = ready.take() {
             if self.interrupt.is_requested() {

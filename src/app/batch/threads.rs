@@ -53,13 +53,12 @@ pub(super) fn workers(args: &BatchArgs, computing: &Computing, item_count: usize
     let threads = (computing.thread_count() / devices.len()).max(1);
     let most = |usual: usize| in_flight.map_or(usual, |count| count as usize).min(share);
     let worker = |selected: Selected| {
-        // A picture that the clock ends is alone on its device, or what it comes to would depend on its neighbours even more.
-        let lanes = matches!(selected, Selected::Vulkan { .. }) && args.picture.time.is_none();
-        let in_flight = if lanes {
-            InFlight::Lanes(most(LANES_USUAL))
-        } else {
-            let count = most(if matches!(selected, Selected::Cpu { .. }) { threads } else { 1 });
-            InFlight::Pools((0..count).map(|_| pool((threads / count).max(1))).collect::<Result<_>>()?)
+        let in_flight = match selected {
+            Selected::Vulkan { .. } => InFlight::Lanes(most(LANES_USUAL)),
+            Selected::Cpu { .. } => {
+                let count = most(threads);
+                InFlight::Pools((0..count).map(|_| pool((threads / count).max(1))).collect::<Result<_>>()?)
+            }
         };
         Ok(Worker { selected, in_flight })
     };
