@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
-use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use clap::{Arg, ArgAction, Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use super::batch::BatchArgs;
 use super::bench::BenchArgs;
@@ -83,17 +83,19 @@ impl Cli {
     pub(super) fn picture_with(&self, flags: &[String]) -> Result<PictureArgs> {
         let known = PictureArgs::augment_args(clap::Command::new("picture"));
         let is_known = |name: &str| known.get_arguments().any(|argument| argument.get_long() == Some(name));
-        for flag in flags {
-            let name = flag.trim_start_matches("--").split('=').next().unwrap_or_default();
-            if !is_known(name) {
-                return Err(Error::Usage(format!(
-                    "params: {name} is no flag that decides a picture; see smalti evolve --help"
-                )));
-            }
+        let names: Vec<&str> =
+            flags.iter().filter_map(|flag| flag.trim_start_matches("--").split('=').next()).collect();
+        if let Some(name) = names.iter().find(|name| !is_known(name)) {
+            return Err(Error::Usage(format!(
+                "params: {name} is no flag that decides a picture; see smalti evolve --help"
+            )));
         }
+        // Of flags that may come several times, those of the row would be added to those that were typed.
+        let lists = known.get_arguments().filter(|argument| matches!(argument.get_action(), ArgAction::Append));
+        let replaced: Vec<&str> = lists.filter_map(Arg::get_long).filter(|name| names.contains(name)).collect();
         let end = self.typed.iter().position(|token| token == "--").unwrap_or(self.typed.len());
         let (before, after) = self.typed.split_at(end);
-        let tokens = before.iter().cloned().chain(flags.iter().map(OsString::from)).chain(after.iter().cloned());
+        let tokens = without(before, &replaced).chain(flags.iter().map(OsString::from)).chain(after.iter().cloned());
         // Given twice, the last one counts.
         let command = ["batch", "plan"]
             .into_iter()
@@ -106,6 +108,22 @@ impl Cli {
             _ => Err(Error::Internal("a batch was typed as another command".to_owned())),
         }
     }
+}
+
+/// Tokens of a command line without these flags and their values.
+fn without<'a>(tokens: &'a [OsString], flags: &'a [&str]) -> impl Iterator<Item = OsString> + 'a {
+    let mut is_value = false;
+    tokens
+        .iter()
+        .filter(move |token| {
+            let text = token.to_string_lossy();
+            let name = text.strip_prefix("--").filter(|_| !is_value);
+            let is_left_out =
+                is_value || name.is_some_and(|name| flags.iter().any(|flag| name.split('=').next() == Some(flag)));
+            is_value = !is_value && is_left_out && !text.contains('=');
+            !is_left_out
+        })
+        .cloned()
 }
 
 /// The first paragraphs of a message of clap in one line, without the usage that follows them.
@@ -284,6 +302,15 @@ mod tests {
     #[test]
     fn the_definition_of_the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_flag_is_left_out_with_its_value_however_it_was_written() {
+        let tokens = ["batch", "--mask", "disc", "in", "--mask=a,b", "--masks", "--restart-mask", "--mask"];
+        let tokens = tokens.map(OsString::from);
+        let left: Vec<OsString> = without(&tokens, &["mask"]).collect();
+        assert_eq!(left, ["batch", "in", "--masks", "--restart-mask"]);
+        assert_eq!(without(&tokens, &[]).count(), tokens.len());
     }
 
     #[test]

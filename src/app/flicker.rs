@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use serde::Serialize;
 
 use super::score::{EXIT_SOME_FAILED, ScoreArgs, read};
-use super::{report, video};
+use super::{inputs, report};
 use crate::error::{Error, Result};
 use crate::metrics::{Difference, Flicker};
 use crate::photo::Photo;
@@ -42,7 +42,7 @@ pub(super) fn score(args: &ScoreArgs) -> ExitCode {
 }
 
 fn score_all(args: &ScoreArgs) -> Result<ExitCode> {
-    let reference = video::frames_in(&args.reference)?;
+    let reference = inputs::in_folder(&args.reference)?;
     let (mut rows, mut worst) = (Vec::new(), 0);
     for folder in &args.pictures {
         match score_one(args, &reference, folder) {
@@ -63,7 +63,7 @@ fn score_all(args: &ScoreArgs) -> Result<ExitCode> {
 }
 
 fn score_one(args: &ScoreArgs, reference: &[PathBuf], folder: &Path) -> Result<Row> {
-    let paths = video::frames_in(folder)?;
+    let paths = inputs::in_folder(folder)?;
     if paths.len() != reference.len() {
         let reason = format!("has {} frames and the reference {}; compare the same ones", paths.len(), reference.len());
         return Err(Error::input(folder, reason));

@@ -18,6 +18,7 @@ mod devices;
 mod film;
 mod flicker;
 mod gallery;
+mod inputs;
 mod inside;
 mod interrupt;
 mod job;

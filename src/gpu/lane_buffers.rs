@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::layout::{LaneRecord, Tile};
-use super::slots::Slots;
+use super::slices::{Slice, Slices};
 use crate::error::Result;
 use crate::model::mask::{TEXELS, Texel};
 use crate::model::tile::pack;
@@ -54,7 +54,7 @@ impl LaneSpan {
 
 /// Buffers with the same places: whoever has some has them in each.
 struct Pool<const COUNT: usize> {
-    slots: Slots,
+    places: Slices,
     /// Name of each buffer, and the bytes of a place.
     kinds: [(&'static str, usize); COUNT],
     buffers: [Arc<Buffer>; COUNT],
@@ -63,15 +63,18 @@ struct Pool<const COUNT: usize> {
 
 impl<const COUNT: usize> Pool<COUNT> {
     fn create(device: &Arc<Device>, kinds: [(&'static str, usize); COUNT], capacity: usize) -> Result<Self> {
-        Ok(Self { slots: Slots::new(capacity), kinds, buffers: create_all(device, kinds, capacity)?, users: 0 })
+        let mut places = Slices::default();
+        places.grow(capacity as u64);
+        Ok(Self { places, kinds, buffers: create_all(device, kinds, capacity)?, users: 0 })
     }
 
     /// Grows until `count` neighbouring places are free; false if that is more than the device's buffers can have.
     fn make_room(&mut self, recorder: &mut Recorder, count: usize) -> Result<bool> {
-        let needed = self.slots.capacity_for(count);
-        if needed <= self.slots.capacity() {
+        let missing = self.places.missing(count as u64) as usize;
+        if missing == 0 {
             return Ok(true);
         }
+        let needed = self.capacity() + missing;
         let device = Arc::clone(recorder.device());
         let place_bytes = self.kinds.iter().map(|kind| kind.1).max().unwrap_or(1);
         let capacity_max = device.info().limits.storage_buffer_bytes as usize / place_bytes;
@@ -79,7 +82,7 @@ impl<const COUNT: usize> Pool<COUNT> {
         if needed > capacity_max && self.users > 0 {
             return Ok(false);
         }
-        let capacity = needed.max((2 * self.slots.capacity()).min(capacity_max));
+        let capacity = needed.max((2 * self.capacity()).min(capacity_max));
         let buffers = create_all(&device, self.kinds, capacity)?;
         if self.users > 0 {
             let mut pass = recorder.transfer_pass("grow buffers of lanes")?;
@@ -91,18 +94,23 @@ impl<const COUNT: usize> Pool<COUNT> {
             recorder.submit_and_wait()?;
         }
         self.buffers = buffers;
-        self.slots.grow(capacity);
+        self.places.grow(capacity as u64);
         Ok(true)
     }
 
+    /// Places, free or not.
+    fn capacity(&self) -> usize {
+        self.places.capacity() as usize
+    }
+
     fn take(&mut self, count: usize) -> Option<usize> {
-        let first = self.slots.take(count)?;
+        let taken = self.places.take(count as u64)?;
         self.users += 1;
-        Some(first)
+        Some(taken.first as usize)
     }
 
     fn give_back(&mut self, places: Range<usize>) {
-        self.slots.give_back(places);
+        self.places.give_back(Slice { first: places.start as u64, count: places.len() as u64 });
         self.users -= 1;
     }
 }
@@ -207,7 +215,7 @@ impl LaneBuffers {
     /// A number that rises whenever buffers are replaced by larger ones: what was bound before is not theirs.
     pub fn version(&self) -> usize {
         let Self { records, flies, pixels, masks, .. } = self;
-        records.slots.capacity() + flies.slots.capacity() + pixels.slots.capacity() + masks.slots.capacity()
+        records.capacity() + flies.capacity() + pixels.capacity() + masks.capacity()
     }
 
     /// First layer of masks with the same texels as `set`, which are uploaded unless a lane has them already.

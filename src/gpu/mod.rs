@@ -18,7 +18,6 @@ mod mosaic_pass;
 mod re_render;
 mod shaders;
 mod slices;
-mod slots;
 mod submission;
 mod translucent_pass;
 

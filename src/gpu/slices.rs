@@ -47,13 +47,12 @@ impl Slices {
         }
     }
 
-    /// Takes units side by side from the smallest free slice that has so many, if any has.
+    /// Takes the first units side by side that are free, if there are so many.
     pub fn take(&mut self, count: u64) -> Option<Slice> {
         if count == 0 {
             return Some(Slice::default());
         }
-        let fitting = self.free.iter().enumerate().filter(|(_, slice)| slice.count >= count);
-        let (place, _) = fitting.min_by_key(|(_, slice)| slice.count)?;
+        let place = self.free.iter().position(|slice| slice.count >= count)?;
         let slice = &mut self.free[place];
         let taken = Slice { first: slice.first, count };
         *slice = Slice { first: slice.first + count, count: slice.count - count };
@@ -91,19 +90,21 @@ mod tests {
     }
 
     #[test]
-    fn slices_come_from_the_smallest_gap_and_gaps_side_by_side_become_one() {
+    fn slices_come_from_the_first_gap_that_has_room_and_gaps_side_by_side_become_one() {
         let mut slices = with_capacity(100);
         let taken: Vec<Slice> = [30, 10, 40, 20].into_iter().filter_map(|count| slices.take(count)).collect();
         assert_eq!(taken.iter().map(|slice| slice.first).collect::<Vec<_>>(), [0, 30, 40, 80]);
         assert_eq!(slices.take(1), None);
         slices.give_back(taken[0]);
         slices.give_back(taken[3]);
-        assert_eq!(slices.take(15), Some(Slice { first: 80, count: 15 }));
-        assert_eq!(slices.take(31), None);
+        assert_eq!(slices.take(15), Some(Slice { first: 0, count: 15 }));
+        assert_eq!(slices.take(16), Some(Slice { first: 80, count: 16 }));
+        assert_eq!(slices.take(16), None);
+        slices.give_back(Slice { first: 0, count: 15 });
         slices.give_back(taken[1]);
         assert_eq!(slices.take(40), Some(Slice { first: 0, count: 40 }));
         slices.give_back(taken[2]);
-        slices.give_back(Slice { first: 80, count: 15 });
+        slices.give_back(Slice { first: 80, count: 16 });
         assert_eq!(slices.free, [Slice { first: 40, count: 60 }]);
     }
 

@@ -153,21 +153,31 @@ fn a_manifest_says_what_is_special_about_each_picture() {
         json!({"input": "in/b.png", "id": "mosaic", "preset": "mosaic", "params": {"tiles": 15, "grout": "auto"}}),
         json!({"input": "in/c.png", "id": "paper", "output": "paper.png", "group": "g",
                "params": {"scheme": "paper", "births": "400", "evals": null, "no-rotation": true}}),
+        json!({"input": "in/c.png", "id": "shapes", "output": "shapes.csv", "params": {"mask": ["disc", "flower"]}}),
     ];
     let manifest: Vec<String> = manifest.iter().map(ToString::to_string).collect();
     let manifest = format!("{}\n\n", manifest.join("\n"));
     workshop.write("m.jsonl", manifest.as_bytes());
     // What is said for all pictures must not contradict what is said for one.
-    let line = "batch --progress none -n 20 -o out --format png,csv --name {dir}/{id}.{ext} --manifest";
+    let line = "batch --progress none -n 20 --mask border -o out --format png,csv --name {dir}/{id}.{ext} --manifest";
     let ran = workshop.run(&format!("{line} m.jsonl"));
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-    let in_folder =
-        ["in/in/a.csv", "in/in/a.png", "in/mosaic.csv", "in/mosaic.png", "other.npz", "paper.png", "x/other.svg"];
+    let in_folder = [
+        "in/in/a.csv",
+        "in/in/a.png",
+        "in/mosaic.csv",
+        "in/mosaic.png",
+        "other.npz",
+        "paper.png",
+        "shapes.csv",
+        "x/other.svg",
+    ];
     assert_eq!(names(&workshop, "out"), in_folder);
     for (flags, output) in [
-        ("in/a.png --seed 7 -n 20", "other.npz"),
-        ("in/b.png --preset mosaic -n 15 --grout auto", "in/mosaic.png"),
-        ("in/c.png --scheme paper -n 20 --births 400 --no-rotation", "paper.png"),
+        ("in/a.png --seed 7 -n 20 --mask border", "other.npz"),
+        ("in/b.png --preset mosaic -n 15 --grout auto --mask border", "in/mosaic.png"),
+        ("in/c.png --scheme paper -n 20 --births 400 --no-rotation --mask border", "paper.png"),
+        ("in/c.png -n 20 --mask disc,flower", "shapes.csv"),
     ] {
         let single = format!("single-{}", output.replace('/', "-"));
         let ran = workshop.run(&format!("evolve {flags} --progress none -o {single}"));

@@ -119,7 +119,7 @@ impl<'a, 'p> Crew<'a, 'p> {
     /// Gives a picture to the crew of its scheme; false if there is no room yet.
     fn begin(&mut self, ticket: u64, picture: &Ready<'a>) -> Result<bool> {
         let job = &picture.work.prepared.job;
-        let _span = picture.work.options.tracer.span("admit").tell("picture", picture.row.id.as_str());
+        let _span = self.pipeline.tracer.span("admit").tell("picture", picture.row.id.as_str());
         match &job.scheme {
             SchemeOptions::Cells(cells) => {
                 let given = job.given_flies(cells.seed);
@@ -134,6 +134,7 @@ impl<'a, 'p> Crew<'a, 'p> {
 
     /// Brings all pictures on by a few milliseconds of work, and sends on those that are done.
     fn step(&mut self) -> Result<()> {
+        let _span = self.pipeline.tracer.frequent_span("step").tell("pictures", self.aboard.len() as u64);
         let searched = if self.searches.is_empty() { Vec::new() } else { self.searches.step()? };
         for finished in searched {
             let Some(picture) = self.aboard.remove(&finished.ticket) else { continue };
@@ -163,6 +164,7 @@ impl<'a, 'p> Crew<'a, 'p> {
         finish: impl FnOnce(&mut Ready<'a>, &mut dyn Evaluator) -> Result<(Ending, Drawn)>,
     ) -> Result<()> {
         picture.row.evolve_ms = report::milliseconds(began.elapsed());
+        let _span = self.pipeline.tracer.span("finish").tell("picture", picture.row.id.as_str());
         let finished = unless_it_panics(|| finish(&mut picture, self.evolutions.evaluator()));
         match finished.and_then(|finished| self.selected.check_validation().map(|()| finished)) {
             Ok((ending, drawn)) => drop(self.done.send(Done { ready: picture, ending, drawn })),

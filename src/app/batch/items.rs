@@ -6,10 +6,10 @@ use std::ffi::OsStr;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use super::inputs::Found;
 use super::manifest::{ManifestRow, Outputs};
 use super::name::{Known, NameTemplate};
 use crate::app::destination::{Destination, place_of};
+use crate::app::inputs::Found;
 use crate::app::inside::Tracer;
 use crate::app::options::{EvolveOptions, SchemeOptions};
 use crate::app::picture::SchemeName;

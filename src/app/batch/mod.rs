@@ -3,7 +3,6 @@
 mod crew;
 mod existing;
 mod gate;
-mod inputs;
 mod items;
 mod manifest;
 mod name;
@@ -23,7 +22,6 @@ use clap::Args;
 
 use self::existing::OnExists;
 use self::gate::Gate;
-use self::inputs::Depth;
 use self::items::{Item, Naming};
 pub(super) use self::manifest::ManifestRow;
 use self::name::NameTemplate;
@@ -34,6 +32,7 @@ use self::threads::IoThreads;
 use super::cli::{Cli, MessageArgs};
 use super::computing::{ComputingArgs, DevicesArg};
 use super::destination::place_of;
+use super::inputs::{self, Depth, Givers};
 use super::inside::{self, Tracer};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::options::{EvolveOptions, Overwrite, Verbosity};
@@ -233,8 +232,9 @@ fn find(args: &BatchArgs, cli: &Cli) -> Result<Vec<Item>> {
     let formats = check_formats(&args.formats)?;
     let naming = Naming { folder: &args.output, template: &args.name, formats: &formats };
     let items = items::gather(found, (manifest, rows), &options_with, &naming)?;
+    let givers = Givers::new(&args.inputs, depth, &args.output);
     for output in items.iter().flat_map(|item| &item.outputs) {
-        if let Some(folder) = inputs::giver_of(&output.path, &args.inputs, (depth, &args.output)) {
+        if let Some(folder) = givers.of(&output.path) {
             return Err(Error::Usage(format!(
                 "{} would be taken for a picture of {} by the next run; name an output folder elsewhere or below it",
                 output.path.display(),

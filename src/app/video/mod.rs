@@ -11,6 +11,7 @@ mod plan;
 mod show;
 mod store;
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use self::frame::Shooter;
@@ -23,10 +24,9 @@ use super::options::Verbosity;
 use super::picture::SchemeName;
 use super::progress::Progress;
 use super::report::{self, Row, Status};
-use super::{destination, film as animation};
+use super::{destination, film as animation, inside};
 use crate::error::{Error, Result};
 
-pub(super) use self::input::in_folder as frames_in;
 pub(super) use self::options::VideoArgs;
 
 /// Makes the frames, and reports about them; the exit code of the process.
@@ -35,7 +35,7 @@ pub(super) fn make(args: &VideoArgs) -> ExitCode {
         return report::exit_code(VideoOptions::new(args).and_then(|options| print_shots(&options, args.json)));
     }
     let mut totals = Totals { id: "total", status: "failed", ..Totals::default() };
-    let done = VideoOptions::new(args).and_then(|options| shoot_all(&options, args, &mut totals));
+    let done = VideoOptions::new(args).and_then(|options| shoot_traced(options, args, &mut totals));
     if let Err(error) = &done {
         totals.error = Some(error.to_string());
         totals.status = if matches!(error, Error::Interrupted) { "partial" } else { "failed" };
@@ -59,6 +59,16 @@ fn print_shots(options: &VideoOptions, is_json: bool) -> Result<()> {
     plan::print_shots(&plan::plan(options, &frames.paths)?, is_json)
 }
 
+/// As [`shoot_all`], and writes the trace if one was asked for.
+fn shoot_traced(mut options: VideoOptions, args: &VideoArgs, totals: &mut Totals) -> Result<()> {
+    if let Some(path) = &args.trace {
+        let taken: Vec<&Path> = options.inputs.iter().chain(&args.outputs).map(PathBuf::as_path).collect();
+        options.pictures.tracer = inside::begin_trace(path, &taken, options.overwrite)?;
+    }
+    shoot_all(&options, args, totals)?;
+    if options.pictures.tracer.is_on() { options.pictures.tracer.finish().map(|_| ()) } else { Ok(()) }
+}
+
 /// The work, in order: find and read the frames, check what is there, make what is missing, show it.
 fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> Result<()> {
     let interrupt = Interrupt::listen()?;
@@ -68,6 +78,7 @@ fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> R
     let frames = input::find(&options.inputs, &options.populations.join("input"))?;
     check_places(options, &frames.paths)?;
     let selected = options.pictures.computing.select()?;
+    inside::trace_device(&options.pictures.tracer, &selected);
     if options.pictures.verbosity > Verbosity::Quiet {
         report::say_device(&selected);
     }
@@ -129,11 +140,11 @@ fn make_frame(
 }
 
 /// Refuses to write frames among those that are read.
-fn check_places(options: &VideoOptions, inputs: &[std::path::PathBuf]) -> Result<()> {
+fn check_places(options: &VideoOptions, inputs: &[PathBuf]) -> Result<()> {
     let places = options.folder.iter().chain([&options.populations]).map(|folder| destination::place_of(folder));
     let places: Vec<_> = places.collect();
     let of_input = inputs.iter().filter_map(|input| input.parent()).map(|folder| {
-        let folder = if folder.as_os_str().is_empty() { std::path::Path::new(".") } else { folder };
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         destination::place_of(folder)
     });
     match of_input.into_iter().find(|folder| places.contains(folder)) {

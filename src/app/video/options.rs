@@ -57,6 +57,9 @@ pub(in crate::app) struct VideoArgs {
     /// Print one line of JSON for each frame, and one for all, to stdout
     #[arg(long, help_heading = "Output")]
     pub json: bool,
+    /// Also write what threads and devices did when, as JSON for ui.perfetto.dev or chrome://tracing; changes no result
+    #[arg(long, value_name = "FILE", help_heading = "Seeing inside")]
+    pub trace: Option<PathBuf>,
     /// Only find the shots, and print them: as a table, or with --json one line for each
     #[arg(long, help_heading = "Output")]
     pub shots: bool,

@@ -1,7 +1,7 @@
 //! The files of the frames: whether each is there and whole, or may be written.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::options::VideoOptions;
 use super::plan::Planned;
@@ -10,7 +10,7 @@ use crate::app::options::Overwrite;
 use crate::app::provenance;
 use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
-use crate::photo::{self, ReadOptions};
+use crate::{output, photo};
 
 /// Digits of the number in a name.
 const DIGITS: usize = 6;
@@ -34,7 +34,7 @@ impl Store {
         }
     }
 
-    /// Creates the folders.
+    /// Creates the folders, and takes away what killed processes left in them.
     ///
     /// # Errors
     /// [`Error::Output`].
@@ -42,6 +42,7 @@ impl Store {
         for folder in self.folder.iter().chain([&self.populations]) {
             fs::create_dir_all(folder)
                 .map_err(|error| Error::output(folder, format!("cannot be created as a folder ({error})")))?;
+            output::sweep(folder)?;
         }
         Ok(())
     }
@@ -72,7 +73,7 @@ impl Store {
         let destinations = self.destinations(frame.number)?;
         let Some(picture) = destinations.get(1) else { return Ok(true) };
         let story = provenance::story_of_file(picture);
-        Ok(story.is_some_and(|story| story.is_of(frame.picture.key())) && is_whole(&picture.path))
+        Ok(story.is_some_and(|story| story.is_of(frame.picture.key())) && photo::is_whole(&picture.path))
     }
 
     /// Refuses to replace whole files that this command would not have written.
@@ -91,7 +92,7 @@ impl Store {
                     Some(story) if story.is_of(key) => continue,
                     Some(_) => "made with other options",
                     // What was cut short, perhaps when the machine went down, is nothing to keep.
-                    None if !path.is_file() || !destination.is_picture() || !is_whole(path) => continue,
+                    None if !path.is_file() || !destination.is_picture() || !photo::is_whole(path) => continue,
                     None => "not made by smalti",
                 };
                 let path = path.display();
@@ -102,9 +103,4 @@ impl Store {
         }
         Ok(())
     }
-}
-
-/// Whether a picture can be read to its end.
-fn is_whole(path: &Path) -> bool {
-    photo::read(path, &ReadOptions::default()).is_ok()
 }

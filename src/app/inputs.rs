@@ -1,4 +1,4 @@
-//! Which files a batch takes: folders, globs and single files, in natural order.
+//! Which pictures a command takes: folders, globs and single files, in natural order.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -58,6 +58,20 @@ pub(super) fn find(named: &[PathBuf], depth: Depth, outputs: &Path) -> Result<Ve
     Ok(found)
 }
 
+/// The pictures in a folder, but not below it, in natural order.
+///
+/// # Errors
+/// [`Error::Input`] if it cannot be read, or holds none.
+pub(super) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    list(folder, Path::new(""), (Depth::Flat, Path::new("")), &mut found)
+        .map_err(|error| Error::input(folder, photo::why_unreadable(&error)))?;
+    if found.is_empty() {
+        return Err(Error::input(folder, "holds no pictures; name another folder"));
+    }
+    Ok(found.into_iter().map(|one| one.path).collect())
+}
+
 /// The pictures in `folder`, and with [`Depth::Recursive`] in those below it: first its own, then folder by folder. A folder with
 /// the name of a picture is taken for one, which fails and is told. Links to folders are not followed: they may lead in a circle.
 fn list(
@@ -89,21 +103,36 @@ fn list(
     Ok(())
 }
 
-/// The folder among `named` that would give the file `written` as a picture, the next time.
-pub(super) fn giver_of<'a>(written: &Path, named: &'a [PathBuf], (depth, outputs): (Depth, &Path)) -> Option<&'a Path> {
-    let (place, outputs) = (place_of(written), place_of(outputs));
-    let gives = |folder: &PathBuf| {
-        let folder = place_of(folder);
-        let is_left_out = outputs != folder && outputs.starts_with(&folder) && place.starts_with(&outputs);
-        match depth {
-            Depth::Flat => place.parent() == Some(&folder),
-            Depth::Recursive => place.starts_with(&folder) && !is_left_out,
-        }
-    };
-    if !is_named_like_a_picture(written) {
-        return None;
+/// The folders that are named, to ask which of them would take an output for a picture, the next time.
+pub(super) struct Givers<'a> {
+    /// As named, and one name for each.
+    folders: Vec<(&'a Path, PathBuf)>,
+    depth: Depth,
+    outputs: PathBuf,
+}
+
+impl<'a> Givers<'a> {
+    /// Of what [`find`] was told.
+    pub(super) fn new(named: &'a [PathBuf], depth: Depth, outputs: &Path) -> Self {
+        let folders = named.iter().filter(|path| path.is_dir()).map(|path| (path.as_path(), place_of(path)));
+        Self { folders: folders.collect(), depth, outputs: place_of(outputs) }
     }
-    named.iter().filter(|path| path.is_dir()).find(|folder| gives(folder)).map(PathBuf::as_path)
+
+    /// The folder that would give the file `written` as a picture.
+    pub(super) fn of(&self, written: &Path) -> Option<&'a Path> {
+        if self.folders.is_empty() || !is_named_like_a_picture(written) {
+            return None;
+        }
+        let place = place_of(written);
+        let gives = |folder: &Path| {
+            let has_outputs = self.outputs != folder && self.outputs.starts_with(folder);
+            match self.depth {
+                Depth::Flat => place.parent() == Some(folder),
+                Depth::Recursive => place.starts_with(folder) && !(has_outputs && place.starts_with(&self.outputs)),
+            }
+        };
+        self.folders.iter().find(|(_, folder)| gives(folder)).map(|(named, _)| *named)
+    }
 }
 
 /// The files that a pattern matches, in natural order; relative to the folders that it names outright, and without those in the
@@ -137,7 +166,7 @@ fn matches(pattern: &str, outputs: &Path) -> Result<Vec<Found>> {
     Ok(found)
 }
 
-fn is_named_like_a_picture(path: &Path) -> bool {
+pub(super) fn is_named_like_a_picture(path: &Path) -> bool {
     let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
     ENDINGS.contains(&ending.as_str())
 }
@@ -195,8 +224,8 @@ mod tests {
             ("b/a.png", Depth::Recursive, "", true),
             ("b/a.png", Depth::Recursive, "out", true),
         ] {
-            let giver = giver_of(&at(written), &named, (depth, &at(outputs)));
-            assert_eq!(giver.is_some(), is_given, "{written} {depth:?} {outputs}");
+            let givers = Givers::new(&named, depth, &at(outputs));
+            assert_eq!(givers.of(&at(written)).is_some(), is_given, "{written} {depth:?} {outputs}");
         }
     }
 
