@@ -53,6 +53,7 @@ uint stack_first(uint place) {
 }
 
 #include "shared/cells_operators.glsl"
+#include "shared/cells_leash.glsl"
 
 // Marginal fitness tells what goes with a victim, its penalty included.
 int without_victim(uint index, Fly victim) {
@@ -489,6 +490,9 @@ void main() {
                 bool is_birth = best.candidate.paint == PAINT_BIRTH;
                 flies[rule.first_fly + changed] = child;
                 steps[rule.first_fly + changed] = is_birth || is_removal ? STEP_FIRST : grown(steps[rule.first_fly + changed]);
+                if (LEASHED == 1u && is_birth) {
+                    origins[rule.first_origin + changed].form = 0u;
+                }
                 if (is_removal) {
                     fitness[rule.first_fly + changed] = 0;
                 } else if (TURN_PENALTY == 1u) {

@@ -47,6 +47,7 @@ layout(std430, binding = 10) coherent buffer StacksBuffer { uvec2 stacks[]; };
 layout(std430, binding = 11) coherent buffer ScratchBuffer { uint scratch[]; };
 
 #include "shared/cells_operators.glsl"
+#include "shared/cells_leash.glsl"
 
 // What goes with a victim besides its pixels.
 int without_victim(uint index, Fly victim) {
@@ -467,6 +468,9 @@ void main() {
                 bool is_birth = best.candidate.paint == PAINT_BIRTH;
                 flies[rule.first_fly + changed] = best.candidate.fly;
                 steps[rule.first_fly + changed] = is_birth || is_removal ? STEP_FIRST : grown(steps[rule.first_fly + changed]);
+                if (LEASHED == 1u && is_birth) {
+                    origins[rule.first_origin + changed].form = 0u;
+                }
                 fitness[rule.first_fly + changed] = is_removal ? 0 : fitness[rule.first_fly + changed] - best.change;
             } else if (was_changed) {
                 steps[rule.first_fly + index] = shrunk(steps[rule.first_fly + index]);

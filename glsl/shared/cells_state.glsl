@@ -58,6 +58,8 @@ struct SearchRules {
     uint mask_first;
     uint mask_count;
     uint depth_gap;
+    // How far a tile may go from where it was.
+    uint leash;
     // Width of the ring of grout, and its colour.
     uint grout;
     uint grout_color;
@@ -89,6 +91,7 @@ struct SearchRules {
     uint first_scratch;
     uint first_guide;
     uint first_mask;
+    uint first_origin;
 };
 
 struct Header {

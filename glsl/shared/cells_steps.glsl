@@ -1,5 +1,5 @@
 // What the steps of a cell have in common, whatever its tiles are: the candidates, their making, and counters. Twin:
-// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_grid.glsl, cells_patches.glsl, cells_suit.glsl and
+// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_grid.glsl, cells_leash.glsl, cells_patches.glsl, cells_suit.glsl and
 // `without_victim`: what the objective changes when a child's victim goes, as far as no pixel has to be looked at for it.
 
 const uint PAINT_KEEP = 0u;
@@ -196,6 +196,9 @@ Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uin
     bool is_kept = candidate.paint == PAINT_KEEP && candidate.is_same && child.rg == old.rg && child.ba == old.ba;
     candidate.is_valid = candidate.is_valid && !is_kept
         && grid_cell_of(grid, footprint_of(child, grid.size).box) == cell_number;
+    if (LEASHED == 1u && candidate.paint != PAINT_BIRTH) {
+        candidate.is_valid = candidate.is_valid && is_on_leash(child, origins[rule.first_origin + candidate.index]);
+    }
     candidate.own = without_victim(candidate.index, old) + turn_penalty(child, local);
     return candidate;
 }

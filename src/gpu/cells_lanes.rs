@@ -182,6 +182,10 @@ impl VulkanLanes {
             Some(flies) => self.write_flies(number, flies)?,
             None => self.write_bare(number)?,
         };
+        if let Some(flies) = first.filter(|_| course.rules.leash > 0) {
+            let origins: Vec<FlyRecord> = flies.iter().map(FlyRecord::new).collect();
+            self.write(number, Part::Origins, bytemuck::cast_slice(&origins))?;
+        }
         let lane = self.lane_mut(number);
         (lane.standing, lane.objective) = (standing, standing.objective);
         (lane.wanted, lane.iterations, lane.has_old_depths) = (0, 0, false);

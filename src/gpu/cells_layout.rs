@@ -71,6 +71,8 @@ pub struct SearchRules {
     pub mask_first: u32,
     pub mask_count: u32,
     pub depth_gap: u32,
+    /// How far a tile may go from where it was, in 1/64 px.
+    pub leash: u32,
     /// Width of the ring of grout in 1/64 px.
     pub grout: u32,
     /// Its colour, packed.
@@ -102,6 +104,7 @@ pub struct SearchRules {
     pub first_scratch: u32,
     pub first_guide: u32,
     pub first_mask: u32,
+    pub first_origin: u32,
 }
 
 /// `Header`: how far a search has come.

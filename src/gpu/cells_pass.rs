@@ -23,8 +23,8 @@ const ITEMS_PER_GROUP: u64 = 64;
 pub(super) struct Variant {
     is_translucent: bool,
     shape: CellShape,
-    /// Specialisation constants 2 to 7.
-    constants: [u32; 6],
+    /// Specialisation constants 2 to 8.
+    constants: [u32; 7],
 }
 
 impl Variant {
@@ -40,6 +40,7 @@ impl Variant {
                 u32::from(rules.penalties.turn > 0),
                 u32::from(rules.bounds.local_size != 0),
                 u32::from(!course.is_plain()),
+                u32::from(rules.leash > 0),
             ],
         }
     }
@@ -258,7 +259,7 @@ fn create_pipeline(
             name,
             spirv: &shaders::words(module),
             specialization,
-            bindings: &[BindingKind::StorageBuffer; 13],
+            bindings: &[BindingKind::StorageBuffer; 14],
             push_constant_bytes: size_of::<CellsPush>() as u32,
         },
     )

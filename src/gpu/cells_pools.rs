@@ -32,10 +32,21 @@ pub(super) enum Pool {
     Guide,
     /// Layers of masks.
     Masks,
+    /// Flies, if they have a leash.
+    Origins,
 }
 
-const POOLS: [Pool; 8] =
-    [Pool::Lanes, Pool::Flies, Pool::Cells, Pool::Blocks, Pool::Stacks, Pool::Scratch, Pool::Guide, Pool::Masks];
+const POOLS: [Pool; 9] = [
+    Pool::Lanes,
+    Pool::Flies,
+    Pool::Cells,
+    Pool::Blocks,
+    Pool::Stacks,
+    Pool::Scratch,
+    Pool::Guide,
+    Pool::Masks,
+    Pool::Origins,
+];
 
 /// A number for each pool.
 pub(super) type PerPool<T> = [T; POOLS.len()];
@@ -56,13 +67,14 @@ pub(super) enum Part {
     Stacks,
     Scratch,
     Masks,
+    Origins,
 }
 
 /// A buffer: its name, the pool that it is for and the bytes of a unit.
 type PartSpec = (Part, &'static str, Option<Pool>, usize);
 
 /// All buffers, in the order of [`Part`].
-const PARTS: [PartSpec; 13] = [
+const PARTS: [PartSpec; 14] = [
     (Part::Rules, "search rules", Some(Pool::Lanes), size_of::<SearchRules>()),
     (Part::Header, "search headers", Some(Pool::Lanes), size_of::<SearchHeader>()),
     (Part::Flies, "flies", Some(Pool::Flies), size_of::<FlyRecord>()),
@@ -76,6 +88,7 @@ const PARTS: [PartSpec; 13] = [
     (Part::Stacks, "stacks", Some(Pool::Stacks), BLOCK_PIXELS * 8),
     (Part::Scratch, "shown pixels", Some(Pool::Scratch), 4),
     (Part::Masks, "masks", Some(Pool::Masks), size_of::<[Texel; TEXELS]>()),
+    (Part::Origins, "origins", Some(Pool::Origins), size_of::<FlyRecord>()),
 ];
 
 /// Masks on the device, and how many lanes wear them.
@@ -301,6 +314,8 @@ fn needs(course: &Course, plan: &Plan, shape: CellShape) -> PerPool<u64> {
         Pool::Stacks => plan.block_count() * plan.stack_depth as u64,
         Pool::Scratch => cells * shape.scratch_words(course, plan),
         Pool::Guide => course.guide.samples.len() as u64,
+        Pool::Origins if course.rules.leash > 0 => course.fly_count as u64,
+        Pool::Origins => 0,
         // The square needs none.
         Pool::Masks => {
             if layers > 1 {

@@ -201,6 +201,7 @@ pub(super) fn rules_record(course: &Course, plan: &Plan, slices: &LaneSlices) ->
         mask_first: rules.mask_first,
         mask_count: rules.mask_count,
         depth_gap: rules.depth_gap,
+        leash: rules.leash,
         grout: rules.grout,
         grout_color: rules.grout_color,
         guide_columns: guide.columns,
@@ -227,6 +228,7 @@ pub(super) fn rules_record(course: &Course, plan: &Plan, slices: &LaneSlices) ->
         first_scratch: slices.first(Pool::Scratch),
         first_guide: slices.first(Pool::Guide),
         first_mask: slices.first(Pool::Masks),
+        first_origin: slices.first(Pool::Origins),
     }
 }
 

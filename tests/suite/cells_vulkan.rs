@@ -168,6 +168,13 @@ pub fn courses() -> Vec<(&'static str, Course)> {
             }),
         ),
         ("picked", plain(|rules| rules.color = ColorSource::Pick)),
+        (
+            "mutants beside tiles on a leash",
+            plain(|rules| {
+                rules.births.kind = BirthKind::Mutant;
+                rules.leash = 150;
+            }),
+        ),
         ("masks", Course { masks: Arc::clone(&masks), ..plain(every_mask) }),
         (
             "masks with grout, weights and transparent pixels",
@@ -201,6 +208,39 @@ fn every_rule_of_every_style_comes_to_the_twins_state() {
         let (_, course) = &courses()[4];
         check_rounds(&device, course, WIDE, 3);
     });
+}
+
+#[test]
+fn tiles_on_a_leash_come_to_the_twins_state_towards_another_picture() {
+    let first = course(parrots(200, 200, 100, 90), 200, |_| {});
+    let flies = evolved(&first, 6);
+    // Bounds that some of the tiles are beyond.
+    let second = course(parrots(203, 198, 100, 90), 200, |rules| {
+        (rules.leash, rules.candidates, rules.seed) = (100, 4, 8);
+        rules.bounds.side_max_q8 = 500;
+    });
+    canary::with_device(&DeviceOptions::default(), |device| {
+        for shape in [narrow(&device), WIDE] {
+            let mut twin = CpuSearch::new(second.clone());
+            let mut search = VulkanSearch::with_shape(&device, second.clone(), shape).expect("it fits");
+            twin.load(&flies).expect("the twin works");
+            search.load(&flies).expect("the device works");
+            check_equal(&mut twin, &mut search, "loaded on a leash");
+            for round in 1..=5 {
+                twin.advance(1).expect("the twin works");
+                search.advance(1).expect("the device works");
+                check_equal(&mut twin, &mut search, &format!("on a leash, {shape:?} after round {round}"));
+            }
+            assert!(twin.standing().accepted > 50, "hardly anything happened");
+        }
+    });
+}
+
+/// What a search comes to in so many rounds.
+fn evolved(course: &Course, rounds: u32) -> Vec<Fly> {
+    let mut search = CpuSearch::new(course.clone());
+    search.advance(rounds).expect("the twin works");
+    search.read_back().expect("the twin works").flies
 }
 
 #[test]

@@ -109,6 +109,13 @@ pub fn courses() -> Vec<(&'static str, Course)> {
             }),
         ),
         ("mutants of fitted colours", plain(|rules| rules.births.kind = BirthKind::Mutant)),
+        (
+            "mutants beside tiles on a leash",
+            plain(|rules| {
+                rules.births.kind = BirthKind::Mutant;
+                rules.leash = 150;
+            }),
+        ),
         ("picked colours", plain(|rules| rules.color = ColorSource::Pick)),
     ]
 }

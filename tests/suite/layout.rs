@@ -115,13 +115,14 @@ fn twins() -> Vec<Twin> {
             aspect_high = "aspect_high", is_stroke = "is_stroke", angle_spread = "angle_spread", coherence_range = "coherence_range",
             side_min_q8 = "side_min_q8", side_max_q8 = "side_max_q8", aspect_max_q8 = "aspect_max_q8",
             overlap = "overlap", turn_penalty = "turn_penalty", mask_first = "mask_first", mask_count = "mask_count",
-            depth_gap = "depth_gap", grout = "grout", grout_color = "grout_color", guide_columns = "guide_columns", guide_rows = "guide_rows",
+            depth_gap = "depth_gap", leash = "leash", grout = "grout", grout_color = "grout_color", guide_columns = "guide_columns", guide_rows = "guide_rows",
             class_count = "class_count", end_0 = "end_0", end_1 = "end_1", end_2 = "end_2", scale_0 = "scale_0",
             scale_1 = "scale_1", scale_2 = "scale_2", scale_3 = "scale_3", first_round_0 = "first_round_0",
             first_round_1 = "first_round_1", first_round_2 = "first_round_2", first_round_3 = "first_round_3",
             background = "background", lane = "lane", first_fly = "first_fly", first_deal = "first_deal",
             first_cell = "first_cell", first_pixel = "first_pixel", first_stack = "first_stack",
-            first_scratch = "first_scratch", first_guide = "first_guide", first_mask = "first_mask"
+            first_scratch = "first_scratch", first_guide = "first_guide", first_mask = "first_mask",
+            first_origin = "first_origin"
         }),
         twin!(SearchHeader = "Header" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
             round = "round", wanted = "wanted", pending = "pending", is_fresh = "is_fresh", overrun = "overrun",

@@ -6,6 +6,8 @@ use std::path::Path;
 
 use image::{Rgb, RgbImage};
 use serde_json::Value;
+use smalti::model::cells::leash::holds;
+use smalti::model::fly::UNITS_PER_PX;
 
 use crate::cli_interrupts::send;
 use crate::cli_refusals::refused;
@@ -150,9 +152,37 @@ fn what_decides_a_frame_is_in_the_keys_of_all_frames_that_go_on_from_it() {
     let same = |other: &[String]| before.iter().zip(other).map(|(a, b)| a == b).collect::<Vec<bool>>();
     assert_eq!(same(&keys("--warm-evals 5k")), [true, false, true, false]);
     assert_eq!(same(&keys("--noise 2")), [true, false, true, false]);
+    assert_eq!(same(&keys("--max-tile-move 4")), [true, false, true, false]);
     assert_eq!(same(&keys("--warm-start off")), [true, false, true, false]);
     workshop.paint("frames/f5.png", 72, 56);
     assert_eq!(same(&keys("")), [false, false, true, true]);
+}
+
+/// How many tiles went farther than 1 px in all frames that go on from another, and how many tiles were born in them.
+fn strays_and_births(workshop: &Workshop, folder: &str, frames: usize) -> (usize, u64) {
+    let read = |frame: usize| {
+        let path = workshop.path(&format!("{folder}/populations/{frame:06}.npz"));
+        smalti::archive::read(&path).expect("a population")
+    };
+    let all: Vec<_> = (0..frames).map(read).collect();
+    let strays = all.windows(2).map(|pair| {
+        let flies = pair[0].population.flies.iter().zip(&pair[1].population.flies);
+        flies.filter(|(old, new)| old.alive && new.alive && !holds(UNITS_PER_PX, old, new)).count()
+    });
+    let births = all[1..].iter().map(|frame| frame.meta["births"].as_u64().expect("a number of births"));
+    (strays.sum(), births.sum())
+}
+
+#[test]
+fn no_tile_that_lives_on_moves_farther_than_it_may() {
+    let workshop = with_frames(5, 99);
+    // Few births, so that most tiles that moved lived on.
+    video(&workshop, "-o free");
+    video(&workshop, "-o tied --max-tile-move 1");
+    let (strays, births) = strays_and_births(&workshop, "tied", 5);
+    assert!(strays as u64 <= births, "{strays} strays, {births} births");
+    let (free_strays, free_births) = strays_and_births(&workshop, "free", 5);
+    assert!(free_strays as u64 > free_births && free_strays > 2 * strays, "{free_strays} strays, {free_births} births");
 }
 
 #[test]
@@ -212,6 +242,7 @@ fn what_makes_no_sequence_is_refused_with_a_sentence() {
         ("video frames -o out --frames 2..2", "expected frames such as 120..240"),
         ("video frames -o out --time 1s", "--time: frames that depend on the clock"),
         ("video frames -o out --scheme paper", "--scheme paper: a sequence needs"),
+        ("video frames -o out --max-tile-move 0", "expected a distance from 0.02 to 512 px"),
         ("video frames -o out --scene-cut 300", "expected off or a difference from 0 to 255"),
         ("video frames -o frames", "holds the frames that are read"),
         ("video frames -o out -o other", "one folder of frames is enough"),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::options::VideoOptions;
+use super::options::{Leash, VideoOptions};
 use super::plan::{Begin, Planned, frame_options};
 use super::show::Watcher;
 use super::store::Store;
@@ -207,7 +207,8 @@ impl<'a> Shooter<'a> {
         let aim = held.target(&last.mosaic, &target)?;
         job.target = Arc::new(held.picture(&target)?);
         let budget = of_rest(budget, held, &last.mosaic, &target);
-        let course = warm_course(&job, &cells, aim, (frame.number - frame.shot) as u64);
+        let mut course = warm_course(&job, &cells, aim, (frame.number - frame.shot) as u64);
+        course.rules.leash = self.options.max_tile_move.map_or(0, |Leash(units)| units);
         Ok(Task { job, picture: target, course, budget, flies: Some(last.population.flies) })
     }
 

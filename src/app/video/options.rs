@@ -13,6 +13,8 @@ use crate::app::picture::PictureArgs;
 use crate::app::values;
 use crate::error::{Error, Result};
 use crate::evolve::held::NOISE_MAX;
+use crate::model::cells::leash::LEASH_MAX;
+use crate::model::fly::UNITS_PER_PX;
 use crate::photo::GIF_FRAMES_PER_S_MAX;
 use crate::vk::Validation;
 
@@ -78,6 +80,10 @@ pub(in crate::app) struct VideoArgs {
     /// Mean difference from what a pixel was evolved towards, 0 to 63 of 255, that is taken for noise and moves no tile
     #[arg(long, value_name = "T", value_parser = values::count, default_value_t = NOISE, help_heading = "Sequence")]
     pub noise: u64,
+    /// How far a tile may move from one frame to the next, up to 512 px: its centre and all of its edges; tiles that are born are
+    /// free [default: anywhere]
+    #[arg(long, value_name = "PX", value_parser = leash, help_heading = "Sequence")]
+    pub max_tile_move: Option<Leash>,
     /// Only the frames from A up to, but not, B, counted from 0; A begins anew, and if it begins a shot, these frames are
     /// those of the whole run
     #[arg(long, value_name = "A..B", value_parser = span, help_heading = "Sequence")]
@@ -113,6 +119,10 @@ pub(in crate::app) enum Limit {
     Off,
 }
 
+/// A distance in 1/64 px, at least 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::app) struct Leash(pub u32);
+
 /// Frames from the first up to, but not, the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::app) struct Span {
@@ -126,6 +136,15 @@ fn cut(text: &str) -> Result<Limit, String> {
         (_, Ok(value)) if value <= 255 => Ok(Limit::At(value)),
         _ => Err("expected off or a difference from 0 to 255, such as 32".to_owned()),
     }
+}
+
+fn leash(text: &str) -> Result<Leash, String> {
+    // Rounded down: a tile never moves farther than was asked for.
+    let units = text.parse::<f64>().ok().map(|px| (px * f64::from(UNITS_PER_PX)).floor());
+    let units = units.filter(|units| (1.0..=f64::from(LEASH_MAX)).contains(units));
+    units
+        .map(|units| Leash(units as u32))
+        .ok_or_else(|| "expected a distance from 0.02 to 512 px, such as 4".to_owned())
 }
 
 fn span(text: &str) -> Result<Span, String> {
@@ -157,6 +176,7 @@ pub(super) struct VideoOptions {
     pub scene_cut: Limit,
     pub keyframe_every: Option<usize>,
     pub noise: u32,
+    pub max_tile_move: Option<Leash>,
     pub span: Option<Span>,
     pub progress: ProgressKind,
 }
@@ -192,6 +212,7 @@ impl VideoOptions {
             scene_cut: args.scene_cut,
             keyframe_every: args.keyframe_every.map(every).transpose()?,
             noise: in_range("--noise", args.noise, (0, u64::from(NOISE_MAX)))? as u32,
+            max_tile_move: args.max_tile_move,
             span: args.frames,
             progress: args.messages.progress.unless(args.messages.quiet),
         })

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::options::{Limit, VideoOptions, WarmStart};
+use super::options::{Leash, Limit, VideoOptions, WarmStart};
 use crate::app::options::{EvolveOptions, SchemeOptions};
 use crate::app::picture::SchemeName;
 use crate::app::prepared::Prepared;
@@ -153,7 +153,10 @@ fn go_on(options: &VideoOptions, frame: Planned, before: &Planned, first: &Seen)
         "noise": options.noise,
         "previous_key": before.population.key(),
     });
-    let more = if let Value::Object(more) = more { more } else { serde_json::Map::new() };
+    let mut more = if let Value::Object(more) = more { more } else { serde_json::Map::new() };
+    if let Some(Leash(units)) = options.max_tile_move {
+        more.insert("max_tile_move_64ths".to_owned(), units.into());
+    }
     Planned { evals, picture: frame.picture.with(more.clone()), population: frame.population.with(more), ..frame }
 }
 

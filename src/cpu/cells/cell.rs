@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 use super::area::{Area, Cover, Exchanged};
 use super::ground::{Ground, Paint, Piece, Swap};
 use crate::model::cells::footprint::Footprint;
+use crate::model::cells::leash;
 use crate::model::cells::operators::{self, Setting, slot};
 use crate::model::cells::random::{Chain, below};
 use crate::model::cells::rules::{Acceptance, BirthKind, ColorSource, STEP_FIRST, grown, shrunk};
@@ -34,6 +35,8 @@ pub struct Member {
     pub fly: Fly,
     /// Step size, u16.16.
     pub step: u32,
+    /// What its leash is tied to: the fly as it was loaded, or an absent one if it was born since.
+    pub origin: Fly,
 }
 
 /// What a cell did in a round.
@@ -115,8 +118,8 @@ impl<'a, G: Ground> Cell<'a, G> {
         match accepted {
             Some(child) => {
                 self.replace(&child);
-                let step = &mut self.members[child.victim].step;
-                *step = if child.is_birth { STEP_FIRST } else { grown(*step) };
+                let Member { step, origin, .. } = &mut self.members[child.victim];
+                (*step, *origin) = if child.is_birth { (STEP_FIRST, Fly::ABSENT) } else { (grown(*step), *origin) };
                 self.done.births += u64::from(child.is_birth);
                 self.done.accepted += 1;
                 self.done.change += child.change;
@@ -236,9 +239,12 @@ impl<'a, G: Ground> Cell<'a, G> {
     fn evaluate(&mut self, victim: usize, child: Fly, paint: Paint) -> Option<Candidate> {
         let (shared, rules) = (self.shared, &self.shared.course.rules);
         let local = self.local(&child);
-        let Member { index, fly: old, .. } = self.members[victim];
+        let Member { index, fly: old, origin, .. } = self.members[victim];
         let child = operators::bounded(&child, &rules.bounds, rules.own_side(index, local));
         if paint != Paint::Birth && paint != Paint::Anew && child == old {
+            return None;
+        }
+        if paint != Paint::Birth && !leash::holds(rules.leash, &origin, &child) {
             return None;
         }
         let footprint = Footprint::of(&child, (shared.grid.width_px, shared.grid.height_px));

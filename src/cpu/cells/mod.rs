@@ -30,7 +30,7 @@ use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
 use crate::model::cells::pixel::{INSIDE, TRANSPARENT, difference};
 use crate::model::cells::random::{Chain, Draw};
 use crate::model::cells::rules::STEP_FIRST;
-use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, depths, operators};
+use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, depths, leash, operators};
 use crate::model::cells::{Grid, NO_CELL};
 use crate::model::fly::Z_MAX;
 use crate::model::tile::pack;
@@ -43,6 +43,8 @@ struct Cells<G> {
     columns: u32,
     flies: Vec<Fly>,
     steps: Vec<u32>,
+    /// What the leashes of flies are tied to, as [`Member::origin`].
+    origins: Vec<Fly>,
     fitness: Vec<AtomicI64>,
     depths: Vec<AtomicU32>,
     owners: Vec<u32>,
@@ -60,6 +62,7 @@ impl<G: Ground> Cells<G> {
             columns,
             flies: vec![Fly::ABSENT; fly_count],
             steps: vec![STEP_FIRST; fly_count],
+            origins: vec![Fly::ABSENT; fly_count],
             fitness: (0..fly_count).map(|_| AtomicI64::new(0)).collect(),
             depths: (0..fly_count).map(|_| AtomicU32::new(Z_MAX)).collect(),
             owners: vec![NO_CELL; fly_count],
@@ -92,6 +95,7 @@ impl<G: Ground> Cells<G> {
         }
         self.flies.fill(Fly::ABSENT);
         self.steps.fill(STEP_FIRST);
+        self.origins.fill(Fly::ABSENT);
         self.fitness.iter_mut().for_each(|fitness| *fitness.get_mut() = 0);
         self.standing = Standing { objective: self.objective(), ..Standing::default() };
     }
@@ -154,9 +158,10 @@ impl<G: Ground> Cells<G> {
             })
             .collect();
         for (members, done) in results {
-            for Member { index, fly, step } in members {
+            for Member { index, fly, step, origin } in members {
                 self.flies[index as usize] = fly;
                 self.steps[index as usize] = step;
+                self.origins[index as usize] = origin;
             }
             self.standing.evals += done.evals;
             self.standing.births += done.births;
@@ -195,7 +200,8 @@ impl<G: Ground> Cells<G> {
             };
             self.owners[index as usize] = cell;
             if cell != NO_CELL {
-                members[cell as usize].push(Member { index, fly: *fly, step: self.steps[index as usize] });
+                let (step, origin) = (self.steps[index as usize], self.origins[index as usize]);
+                members[cell as usize].push(Member { index, fly: *fly, step, origin });
             }
         }
         members
@@ -235,7 +241,8 @@ impl<G: Ground> Search for Cells<G> {
             is_plain: self.course.is_plain(),
         };
         let area = Area::new(self.blocks.iter_mut().collect(), self.columns as usize, (0, 0));
-        let members = (0..).zip(flies).map(|(index, _)| Member { index, fly: Fly::ABSENT, step: STEP_FIRST }).collect();
+        let member = |(index, &origin)| Member { index, fly: Fly::ABSENT, step: STEP_FIRST, origin };
+        let members = (0..).zip(flies).map(member).collect();
         let mut cell =
             Cell { shared: &shared, number: 0, area, members, desk: G::Desk::default(), done: Done::default() };
         // Nearest first, so that it is the deepest flies that find no room.
@@ -244,11 +251,14 @@ impl<G: Ground> Search for Cells<G> {
             if flies[index].alive {
                 let local = self.course.guide.at(flies[index].x >> 6, flies[index].y >> 6);
                 let own_side = rules.own_side(index as u32, local);
-                cell.place(index, &operators::bounded(&flies[index], &rules.bounds, own_side));
+                let fly = operators::bounded(&flies[index], &rules.bounds, own_side);
+                if leash::holds(rules.leash, &flies[index], &fly) {
+                    cell.place(index, &fly);
+                }
             }
         }
-        for Member { index, fly, .. } in cell.members {
-            self.flies[index as usize] = fly;
+        for Member { index, fly, origin, .. } in cell.members {
+            (self.flies[index as usize], self.origins[index as usize]) = (fly, origin);
         }
         self.standing.objective = self.objective();
         self.refresh(&grid);
@@ -290,5 +300,54 @@ impl<G: Ground> Search for Cells<G> {
         };
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| stack_at(x, y)).collect();
         Ok(Stacks { pixels })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::block::Block;
+    use super::*;
+    use crate::model::cells::Rules;
+    use crate::model::guide::SIZE_ONE;
+    use crate::model::{Guide, GuideSample, MaskSet, Target};
+
+    /// A disc, `shift` px from the left, on a gradient.
+    fn course(shift: u32, leash: u32) -> Course {
+        let is_inside = |x: u32, y: u32| x.abs_diff(20 + shift).pow(2) + y.abs_diff(30).pow(2) < 150;
+        let pixels = (0..64 * 60).map(|place| (place % 64, place / 64));
+        let pixel = |(x, y)| if is_inside(x, y) { [250, 220, 30] } else { [(3 * x) as u8, (4 * y) as u8, 90] };
+        let target = Target::new(64, 60, pixels.map(pixel).collect()).expect("the pixels are of this size");
+        let rules = Rules { leash, ..Rules::free(5, 360, 120, [0; 3]) };
+        let samples = vec![GuideSample { direction: 0, coherence: 0, size_q12: SIZE_ONE }; 16 * 15];
+        let guide = Arc::new(Guide { columns: 16, rows: 15, samples });
+        Course { rules, target: Arc::new(target), guide, masks: Arc::new(MaskSet::default()), fly_count: 120 }
+    }
+
+    /// How many of the flies that lived on after some rounds from one picture to another are on a leash of this length, and how many
+    /// of those are elsewhere than before; and how many are off it.
+    fn on_and_off(leash: u32, length: u32) -> (usize, usize, usize) {
+        let mut search = Cells::<Block>::new(course(0, 0));
+        search.advance(8).expect("nothing fails");
+        let flies = search.flies;
+        let mut search = Cells::<Block>::new(course(7, leash));
+        search.load(&flies).expect("nothing fails");
+        search.advance(12).expect("nothing fails");
+        let lived: Vec<(&Fly, &Fly)> =
+            search.origins.iter().zip(&search.flies).filter(|(origin, fly)| origin.alive && fly.alive).collect();
+        assert!(lived.iter().all(|(origin, _)| flies.contains(origin)), "what they are tied to is what was loaded");
+        let (on, off): (Vec<_>, Vec<_>) = lived.iter().partition(|(origin, fly)| leash::holds(length, origin, fly));
+        let place = |fly: &Fly| (fly.x, fly.y, fly.w, fly.h, fly.angle);
+        (on.len(), on.iter().filter(|(origin, fly)| place(origin) != place(fly)).count(), off.len())
+    }
+
+    #[test]
+    fn no_fly_that_lives_on_leaves_its_leash() {
+        let (held, moved, off) = on_and_off(128, 128);
+        assert!(held > 40 && moved > 20, "{held} flies live on, {moved} moved");
+        assert_eq!(off, 0);
+        let (_, _, off) = on_and_off(0, 128);
+        assert!(off > 10, "without a leash {off} flies go as far");
     }
 }

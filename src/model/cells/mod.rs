@@ -9,6 +9,7 @@ pub mod depths;
 pub mod footprint;
 pub mod glaze;
 pub mod grid;
+pub mod leash;
 pub mod operators;
 pub mod pixel;
 pub mod random;

@@ -182,6 +182,9 @@ pub struct Rules {
     pub mask_count: u32,
     /// Depth of a newborn tile in front of what shows: up to this.
     pub depth_gap: u32,
+    /// How far a tile may go from where it was when the population was loaded, in 1/64 px, at most [`super::leash::LEASH_MAX`];
+    /// 0 is anywhere. Tiles born since are free.
+    pub leash: u32,
     /// Colour behind all tiles, packed.
     pub background: u32,
     /// Width of the grout ring of every tile in 1/64 px; 0 is none.
@@ -245,6 +248,7 @@ impl Rules {
             mask_first: 0,
             mask_count: 1,
             depth_gap: ((Z_MAX + 1) / (fly_count as u32).max(1)).clamp(1, 256),
+            leash: 0,
             background: pack(background),
             grout: 0,
             grout_color: 0,

@@ -82,7 +82,7 @@ pub trait Search: Send {
     fn course(&self) -> &Course;
 
     /// Replaces the population, and begins to count anew. Flies that would stack deeper on a pixel than the search keeps track
-    /// of become absent.
+    /// of become absent, and so do those that the bounds of their sides would take off their leash.
     ///
     /// # Errors
     /// If the device fails.
