@@ -3,9 +3,11 @@
 //! The bytes go to a temporary file beside the target, which then takes the target's name. Nothing here knows what the
 //! bytes mean, or whether the user agreed to replace what is there.
 
-use std::fs::{self, File, Metadata, TryLockError};
+use std::fs::{self, DirEntry, File, Metadata, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf, is_separator};
+use std::sync::OnceLock;
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
@@ -14,6 +16,10 @@ use crate::error::{Error, Result};
 /// How the names of temporary files begin and end.
 const PREFIX: &str = ".smalti-";
 const SUFFIX: &str = ".partial";
+/// What ends the host in such a name; no host has it.
+const HOST_END: char = '@';
+/// Temporary files of other hosts, whose locks may not reach here, are left behind if nobody wrote to them for so long.
+const LEFT_AFTER: Duration = Duration::from_secs(24 * 3600);
 
 /// Writes `bytes` to `path`, replacing what is there in one step.
 ///
@@ -137,8 +143,14 @@ impl Journal {
     pub fn append(&mut self, line: &str) -> Result<()> {
         // Where the file system has no locks, short writes at the end do not mix either.
         let is_locked = self.file.lock().is_ok();
+        let length = self.file.metadata().ok().filter(Metadata::is_file).map(|found| found.len());
         let done = self.append_whole(line);
         if is_locked {
+            // A half line tells nothing. If it cannot be taken away, the next line ends it. Without the lock, it might be
+            // another process's line that would be cut.
+            if let (Err(_), Some(length)) = (&done, length) {
+                let _ = self.file.set_len(length);
+            }
             let _ = self.file.unlock();
         }
         done.map_err(|error| output_error(&self.path, &error))
@@ -158,12 +170,7 @@ impl Journal {
                 bytes.insert(0, b'\n');
             }
         }
-        let written = self.file.write_all(&bytes);
-        if written.is_err() {
-            // A half line tells nothing. If it cannot be taken away, the next line ends it.
-            let _ = self.file.set_len(length);
-        }
-        written
+        self.file.write_all(&bytes)
     }
 }
 
@@ -233,7 +240,8 @@ fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
 
 fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(PREFIX).suffix(SUFFIX);
+    let prefix = format!("{}{}-", own_prefix(), std::process::id());
+    builder.prefix(&prefix).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -255,12 +263,26 @@ fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     }
 }
 
-/// Removes the temporary files that processes left in `folder` when they were killed. Those of living processes are locked, and
-/// stay, and so do those that belong to somebody else.
+/// How the names of this host's temporary files begin.
+fn own_prefix() -> String {
+    static HOST: OnceLock<String> = OnceLock::new();
+    let host = HOST.get_or_init(|| {
+        let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+        let plain = |char: char| if char.is_ascii_alphanumeric() || char == '.' { char } else { '-' };
+        name.trim().chars().map(plain).take(64).collect()
+    });
+    format!("{PREFIX}{host}{HOST_END}")
+}
+
+/// Removes the temporary files that processes of this host left in `folder` when they were killed, and those of other hosts to
+/// which nobody wrote for a day by `age_of`. Those of living processes are locked, and stay, and so do those that belong to
+/// somebody else.
 ///
 /// # Errors
 /// [`Error::Output`] if the folder cannot be read, or such a file cannot be removed.
-pub fn sweep(folder: &Path) -> Result<()> {
+pub fn sweep(folder: &Path, age_of: impl Fn(&Metadata) -> Option<Duration>) -> Result<()> {
+    let own_prefix = own_prefix();
+    let is_left = |entry: &DirEntry| entry.metadata().ok().and_then(|found| age_of(&found)) > Some(LEFT_AFTER);
     let sweep = || -> io::Result<()> {
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
@@ -268,7 +290,10 @@ pub fn sweep(folder: &Path) -> Result<()> {
             let name = name.as_encoded_bytes();
             let is_named_so = name.starts_with(PREFIX.as_bytes()) && name.ends_with(SUFFIX.as_bytes());
             // To open a pipe would wait for its writer.
-            if is_named_so && entry.file_type()?.is_file() {
+            if is_named_so
+                && entry.file_type()?.is_file()
+                && (name.starts_with(own_prefix.as_bytes()) || is_left(&entry))
+            {
                 remove_unless_in_use(&entry.path())?;
             }
         }
@@ -279,7 +304,8 @@ pub fn sweep(folder: &Path) -> Result<()> {
 
 fn remove_unless_in_use(path: &Path) -> io::Result<()> {
     let remove = || -> io::Result<()> {
-        let file = File::open(path)?;
+        // For an exclusive lock, NFS wants a file that may be written to.
+        let file = File::options().read(true).write(true).open(path)?;
         if file.try_lock().is_ok() { fs::remove_file(path) } else { Ok(()) }
     };
     remove().or_else(|error| match error.kind() {
@@ -348,16 +374,19 @@ mod tests {
     #[test]
     fn what_a_killed_process_left_is_swept_and_what_a_living_one_writes_is_not() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let left = folder.path().join(".smalti-abc.partial");
+        let left = folder.path().join(format!("{}1-abc{SUFFIX}", own_prefix()));
         let other = folder.path().join(".other.partial");
-        for path in [&left, &other] {
+        let of_host = folder.path().join(".smalti-another.host@1-abc.partial");
+        for path in [&left, &other, &of_host] {
             fs::write(path, b"half").expect("the folder is ours");
         }
         let growing = PartialFile::create(&folder.path().join("out.png")).expect("the folder is ours");
-        sweep(folder.path()).expect("the folder is ours");
-        assert!(!left.exists() && other.exists() && growing.growing_path().exists());
+        sweep(folder.path(), |_| Some(Duration::ZERO)).expect("the folder is ours");
+        assert!(!left.exists() && other.exists() && of_host.exists() && growing.growing_path().exists());
+        sweep(folder.path(), |_| Some(2 * LEFT_AFTER)).expect("the folder is ours");
+        assert!(other.exists() && !of_host.exists() && growing.growing_path().exists());
         growing.commit().expect("nothing took it away");
         assert!(folder.path().join("out.png").exists());
-        assert!(sweep(&folder.path().join("none")).is_err());
+        assert!(sweep(&folder.path().join("none"), |_| None).is_err());
     }
 }

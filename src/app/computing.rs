@@ -18,8 +18,16 @@ pub(super) struct ComputingArgs {
     #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
     pub device: String,
     /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", env = "SMALTI_THREADS", value_parser = values::count)]
-    pub threads: Option<u64>,
+    #[arg(long, value_name = "T", env = "SMALTI_THREADS", value_parser = thread_choice)]
+    pub threads: Option<ThreadChoice>,
+}
+
+/// How many threads were asked for; none by an empty SMALTI_THREADS.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ThreadChoice(Option<u64>);
+
+fn thread_choice(text: &str) -> Result<ThreadChoice, String> {
+    if text.is_empty() { Ok(ThreadChoice(None)) } else { values::count(text).map(Some).map(ThreadChoice) }
 }
 
 /// The flag of commands that can use several devices.
@@ -70,7 +78,8 @@ impl ComputingArgs {
             return Err(Error::Usage(sentence.to_owned()));
         }
         let in_range = |count| options::in_range("--threads", count, (1, THREADS_MAX)).map(|count| count as usize);
-        Ok(Computing { request, validation, threads: self.threads.map(in_range).transpose()? })
+        let asked_for = self.threads.and_then(|ThreadChoice(count)| count);
+        Ok(Computing { request, validation, threads: asked_for.map(in_range).transpose()? })
     }
 
     /// Gives the CPU twin its threads and opens the device, and says so if nobody asked for the CPU: for

@@ -25,8 +25,10 @@ pub(super) fn expand(mut typed: Vec<OsString>, whole: &Command) -> Result<Vec<Os
     let path = matches.try_get_one::<PathBuf>("config").ok().flatten();
     let path = path.or_else(|| of_command.try_get_one("config").ok().flatten());
     let (Some(path), Some(command)) = (path, whole.find_subcommand(name)) else { return Ok(typed) };
-    check(path, whole)?;
-    let flags = File::read(path)?.flags(command, of_command)?;
+    // Read once: it may be a pipe.
+    let file = File::read(path)?;
+    file.check(whole)?;
+    let flags = file.flags(command, of_command)?;
     let end = typed.iter().position(|token| token == "--").unwrap_or(typed.len());
     typed.splice(end..end, flags.into_iter().map(OsString::from));
     Ok(typed)
@@ -68,52 +70,72 @@ impl<'a> File<'a> {
             }
         }
         let given = |argument: &Arg| {
-            let source = matches.value_source(argument.get_id().as_str());
-            matches!(source, Some(ValueSource::CommandLine | ValueSource::EnvVariable))
+            let id = argument.get_id().as_str();
+            match matches.value_source(id) {
+                Some(ValueSource::CommandLine) => true,
+                Some(ValueSource::EnvVariable) => {
+                    matches.get_raw(id).into_iter().flatten().any(|value| !value.is_empty())
+                }
+                _ => false,
+            }
         };
+        if values.contains_key("devices") {
+            values.remove("device");
+        }
         let mut flags = Vec::new();
         for (key, value) in values {
             let Some(argument) = find(command, key) else { continue };
-            let is_outdone = given(argument) || command.get_arg_conflicts_with(argument).into_iter().any(given);
-            if !is_outdone {
-                flags.extend(self.spelt(key, value)?);
+            let conflicts = command.get_arg_conflicts_with(argument).into_iter();
+            // Clap does not know of these two: SMALTI_DEVICE and --devices are no conflict.
+            let rival = match key {
+                "device" => find(command, "devices"),
+                "devices" => find(command, "device"),
+                _ => None,
+            };
+            if !given(argument) && !conflicts.chain(rival).any(given) {
+                flags.extend(self.spelt(argument, key, value)?);
             }
         }
         Ok(flags)
     }
 
     /// A key as flags.
-    fn spelt(&self, key: &str, value: &Value) -> Result<Vec<String>> {
+    fn spelt(&self, argument: &Arg, key: &str, value: &Value) -> Result<Vec<String>> {
+        let takes_value = argument.get_action().takes_values();
+        let refuse = |reason: String| Err(Error::input(self.path, reason));
         let values = if let Value::Array(values) = value { values.as_slice() } else { std::slice::from_ref(value) };
         let spell = |value: &Value| match value {
+            Value::Boolean(true) if takes_value => refuse(format!("{key} needs a value, and true is none")),
+            Value::Integer(_) | Value::Float(_) | Value::String(_) if !takes_value => {
+                refuse(format!("{key} must be true or false"))
+            }
             Value::Boolean(true) => Ok(Some(format!("--{key}"))),
             Value::Boolean(false) => Ok(None),
             Value::Integer(number) => Ok(Some(format!("--{key}={number}"))),
             Value::Float(number) => Ok(Some(format!("--{key}={number}"))),
             Value::String(text) => Ok(Some(format!("--{key}={text}"))),
             Value::Datetime(_) | Value::Array(_) | Value::Table(_) => {
-                let reason = format!("{key} must be a text, a number, true, false, or a list of such");
-                Err(Error::input(self.path, reason))
+                refuse(format!("{key} must be a text, a number, true, false, or a list of such"))
             }
         };
         values.iter().filter_map(|value| spell(value).transpose()).collect()
     }
-}
 
-/// Refuses a file with a key that no command has; `command` is the whole command line's.
-fn check(path: &Path, command: &Command) -> Result<()> {
-    let file = File::read(path)?;
-    for (key, value) in &file.table {
-        let is_known = match value {
-            Value::Table(_) => command.find_subcommand(key).is_some(),
-            _ => command.get_subcommands().any(|command| find(command, key).is_some()),
-        };
-        if !is_known {
-            let what = if value.is_table() { format!("[{key}] is no command") } else { format!("{key} is no flag") };
-            return Err(Error::input(path, format!("{what}; see smalti --help")));
+    /// Refuses a key that no command has; `command` is the whole command line's.
+    fn check(&self, command: &Command) -> Result<()> {
+        for (key, value) in &self.table {
+            let is_known = match value {
+                Value::Table(_) => command.find_subcommand(key).is_some(),
+                _ => command.get_subcommands().any(|command| find(command, key).is_some()),
+            };
+            if !is_known {
+                let what =
+                    if value.is_table() { format!("[{key}] is no command") } else { format!("{key} is no flag") };
+                return Err(Error::input(self.path, format!("{what}; see smalti --help")));
+            }
         }
+        Ok(())
     }
-    Ok(())
 }
 
 /// The flag of a command that is called `name`.
@@ -156,6 +178,19 @@ mod tests {
     }
 
     #[test]
+    fn one_device_in_the_file_gives_way_to_several_that_are_typed_and_the_other_way_round() {
+        let batch = "smalti batch in -o out --config CONFIG";
+        for (file, typed, wanted) in [
+            ("device = 'cpu'", "--devices cpu", ""),
+            ("[batch]\ndevices = 'all'", "--device cpu", ""),
+            ("device = 'cpu'\n[batch]\ndevices = 'all'", "--recursive", " --devices=all"),
+        ] {
+            let told = expanded(file, &format!("{batch} {typed}")).expect("it is right");
+            assert_eq!(told, format!("{batch} {typed}{wanted}"));
+        }
+    }
+
+    #[test]
     fn what_no_command_knows_is_refused_by_name() {
         for (file, told) in [
             ("tile = 7", "tile is no flag"),
@@ -163,6 +198,8 @@ mod tests {
             ("[evolve]\nshard = '1/2'", "[evolve] has shard"),
             ("size = 1979-05-27", "size must be"),
             ("size = ", "is no TOML"),
+            ("tiles = true", "c.toml: tiles needs a value"),
+            ("quiet = 3", "c.toml: quiet must be true or false"),
         ] {
             let refusal = expanded(file, "smalti evolve a.png -o b.png --config CONFIG").expect_err(file).to_string();
             assert!(refusal.contains(told), "{refusal}");

@@ -203,6 +203,14 @@ fn stdout_is_closed() -> bool {
     false
 }
 
+/// Takes away what killed processes left in a folder, as [`output::sweep`].
+///
+/// # Errors
+/// As from there.
+pub(super) fn sweep(folder: &Path) -> Result<()> {
+    output::sweep(folder, |found| found.modified().ok()?.elapsed().ok())
+}
+
 /// Whether a place is that of one of these files.
 pub(super) fn is_one_of(place: &Path, paths: &[&Path]) -> bool {
     paths.iter().any(|path| place == place_of(path))

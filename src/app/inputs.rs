@@ -5,6 +5,8 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use glob::{MatchOptions, Pattern};
+
 use crate::app::destination::place_of;
 use crate::error::{Error, Result};
 use crate::photo;
@@ -46,7 +48,7 @@ pub(super) fn find(named: &[PathBuf], depth: Depth, outputs: &Path) -> Result<Ve
         if path.is_dir() {
             let unreadable = |error| Error::input(path, photo::why_unreadable(&error));
             list(path, Path::new(""), (depth, &outputs), &mut found).map_err(unreadable)?;
-        } else if path.symlink_metadata().is_err() && text.contains(WILD) {
+        } else if is_pattern(path) {
             found.extend(matches(&text, &outputs)?);
         } else {
             let relative = path.file_name().map_or_else(|| path.clone(), PathBuf::from);
@@ -103,10 +105,11 @@ fn list(
     Ok(())
 }
 
-/// The folders that are named, to ask which of them would take an output for a picture, the next time.
+/// The folders and patterns that are named, to ask which of them would take an output for a picture, the next time.
 pub(super) struct Givers<'a> {
     /// As named, and one name for each.
     folders: Vec<(&'a Path, PathBuf)>,
+    patterns: Vec<GivingPattern<'a>>,
     depth: Depth,
     outputs: PathBuf,
 }
@@ -115,15 +118,20 @@ impl<'a> Givers<'a> {
     /// Of what [`find`] was told.
     pub(super) fn new(named: &'a [PathBuf], depth: Depth, outputs: &Path) -> Self {
         let folders = named.iter().filter(|path| path.is_dir()).map(|path| (path.as_path(), place_of(path)));
-        Self { folders: folders.collect(), depth, outputs: place_of(outputs) }
+        let patterns = named.iter().filter(|path| is_pattern(path)).filter_map(|path| GivingPattern::new(path));
+        Self { folders: folders.collect(), patterns: patterns.collect(), depth, outputs: place_of(outputs) }
     }
 
-    /// The folder that would give the file `written` as a picture.
+    /// The folder or the pattern that would give the file `written` as a picture.
     pub(super) fn of(&self, written: &Path) -> Option<&'a Path> {
-        if self.folders.is_empty() || !is_named_like_a_picture(written) {
+        let has_name = is_named_like_a_picture(written);
+        if self.patterns.is_empty() && (self.folders.is_empty() || !has_name) {
             return None;
         }
         let place = place_of(written);
+        if let Some(pattern) = self.patterns.iter().find(|pattern| pattern.gives(&place, &self.outputs)) {
+            return Some(pattern.named);
+        }
         let gives = |folder: &Path| {
             let has_outputs = self.outputs != folder && self.outputs.starts_with(folder);
             match self.depth {
@@ -131,8 +139,49 @@ impl<'a> Givers<'a> {
                 Depth::Recursive => place.starts_with(folder) && !(has_outputs && place.starts_with(&self.outputs)),
             }
         };
-        self.folders.iter().find(|(_, folder)| gives(folder)).map(|(named, _)| *named)
+        self.folders.iter().filter(|_| has_name).find(|(_, folder)| gives(folder)).map(|(named, _)| *named)
     }
+}
+
+/// A pattern, and what it matches wherever it is seen from.
+struct GivingPattern<'a> {
+    named: &'a Path,
+    /// The place of the folders that it names outright.
+    base: PathBuf,
+    whole: Pattern,
+}
+
+impl<'a> GivingPattern<'a> {
+    fn new(named: &'a Path) -> Option<Self> {
+        let plain = plain_part(named);
+        let base = base_of(&plain);
+        let rest = named.strip_prefix(&plain).ok()?;
+        let whole = Path::new(&Pattern::escape(base.to_str()?)).join(rest);
+        Some(Self { named, base, whole: Pattern::new(whole.to_str()?).ok()? })
+    }
+
+    /// Whether the pattern matches a place, other than in a folder of outputs below where it begins.
+    fn gives(&self, place: &Path, outputs: &Path) -> bool {
+        let has_outputs = outputs != self.base && outputs.starts_with(&self.base);
+        let is_output = has_outputs && place.parent().is_some_and(|folder| folder.starts_with(outputs));
+        let how = MatchOptions { require_literal_separator: true, ..MatchOptions::new() };
+        !is_output && self.whole.matches_path_with(place, how)
+    }
+}
+
+/// Whether what was named stands for what matches it.
+fn is_pattern(named: &Path) -> bool {
+    named.symlink_metadata().is_err() && named.to_string_lossy().contains(WILD)
+}
+
+/// The folders that a pattern names outright, as they were named.
+fn plain_part(pattern: &Path) -> PathBuf {
+    pattern.components().take_while(|part| !part.as_os_str().to_string_lossy().contains(WILD)).collect()
+}
+
+/// The place of these folders.
+fn base_of(plain: &Path) -> PathBuf {
+    place_of(if plain.as_os_str().is_empty() { Path::new(".") } else { plain })
 }
 
 /// The files that a pattern matches, in natural order; relative to the folders that it names outright, and without those in the
@@ -143,9 +192,8 @@ fn matches(pattern: &str, outputs: &Path) -> Result<Vec<Found>> {
             "{pattern}: not a pattern ({error}); write a * for any part of a name, as in 'photos/*.jpg'"
         ))
     })?;
-    let plain: PathBuf =
-        Path::new(pattern).components().take_while(|part| !part.as_os_str().to_string_lossy().contains(WILD)).collect();
-    let base = place_of(if plain.as_os_str().is_empty() { Path::new(".") } else { &plain });
+    let plain = plain_part(Path::new(pattern));
+    let base = base_of(&plain);
     let has_outputs = outputs != base && outputs.starts_with(&base);
     let is_output =
         |path: &Path| has_outputs && path.parent().is_some_and(|folder| place_of(folder).starts_with(outputs));
@@ -226,6 +274,26 @@ mod tests {
         ] {
             let givers = Givers::new(&named, depth, &at(outputs));
             assert_eq!(givers.of(&at(written)).is_some(), is_given, "{written} {depth:?} {outputs}");
+        }
+    }
+
+    #[test]
+    fn a_pattern_would_give_what_it_matches_but_nothing_from_a_folder_of_outputs_below() {
+        let folder = folder();
+        let at = |name: &str| folder.path().join(name);
+        for (pattern, written, outputs, is_given) in [
+            ("b/*.png", "b/p-m.png", "b", true),
+            ("b/*.png", "b/../b/p-m.png", "b", true),
+            ("b/*.png", "b/p-m.svg", "b", false),
+            ("b/*", "b/p-m.svg", "b", true),
+            ("b/*.png", "b/deep/p.png", "b", false),
+            ("**/*.png", "b/out/p.png", "b", false),
+            ("**/*.png", "b/out/p.png", "elsewhere", true),
+            ("*/*.png", "b/p.png", "b", false),
+        ] {
+            let named = [at(pattern)];
+            let givers = Givers::new(&named, Depth::Flat, &at(outputs));
+            assert_eq!(givers.of(&at(written)).is_some(), is_given, "{pattern} {written} {outputs}");
         }
     }
 

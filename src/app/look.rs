@@ -124,6 +124,11 @@ impl Look {
         Ok(Self { masks, restart_masks, shader: args.shader.unwrap_or(Shader::Template), blend, opacity })
     }
 
+    /// The masks as they were named: those built in, and files.
+    pub(super) fn named_masks(&self) -> impl Iterator<Item = &PathBuf> {
+        self.masks.iter().chain(&self.restart_masks)
+    }
+
     /// Whether nothing was asked for.
     pub(super) fn is_default(&self) -> bool {
         self.masks.is_empty()

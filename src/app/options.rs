@@ -205,6 +205,14 @@ impl EvolveOptions {
         iter::once(&self.input).chain(&self.weight).map(PathBuf::as_path).collect()
     }
 
+    /// The files that all pictures share, none of which may be written over: map, population, palette and masks. The name of a
+    /// mask that is built in is the name of no file.
+    pub(super) fn shared_inputs(&self) -> impl Iterator<Item = &Path> {
+        let palette = if let Colors::Palette(path) = &self.colors { Some(path) } else { None };
+        let masks = self.look.named_masks().filter(|name| name.exists());
+        self.weight.iter().chain(&self.init).chain(palette).chain(masks).map(PathBuf::as_path)
+    }
+
     /// Every file that will be written.
     pub(super) fn destinations(&self) -> impl Iterator<Item = &Destination> {
         self.outputs.iter().chain(&self.save_target)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use crate::batch::{ALL_FORMATS, batch, done, paint, rows, statuses, tree};
 use crate::cli_interrupts::send;
@@ -226,6 +226,8 @@ fn what_is_killed_at_any_moment_is_finished_by_the_same_command_with_the_same_by
     // Files that another process left when it was killed.
     std::fs::create_dir(workshop.path("out")).unwrap();
     workshop.write("out/.smalti-left.partial", b"half");
+    let left = std::fs::File::options().write(true).open(workshop.path("out/.smalti-left.partial")).unwrap();
+    left.set_modified(SystemTime::now() - Duration::from_secs(2 * 24 * 3600)).unwrap();
     for (number, delay_ms) in [20, 150, 60, 280, 100, 400].into_iter().enumerate() {
         let shard = if number % 3 == 2 { "--shard 2/3" } else { "" };
         let mut child = workshop.command(&format!("{work} -o out {shard}")).stdout(Stdio::null()).spawn().unwrap();

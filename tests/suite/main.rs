@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test that it is in")]
 
 mod batch;
+mod batch_places;
 mod batch_resume;
 mod bench;
 mod canary;

@@ -125,6 +125,9 @@ fn a_merge_tells_what_is_missing_and_replaces_no_file_that_is_not_its_own() {
 
     let refused = run(&workshop, 2, "merge results.jsonl -o photo.png");
     assert!(refused.stderr.contains("photo.png exists and holds no merged rows"), "{}", refused.stderr);
+    for _ in 0..2 {
+        run(&workshop, 0, "merge . -o results-all.jsonl");
+    }
     let refused = run(&workshop, 2, "merge . -o results.jsonl");
     assert!(refused.stderr.contains("is an input"), "{}", refused.stderr);
     run(&workshop, 2, "merge nothing.jsonl -o new.jsonl");

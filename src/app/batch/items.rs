@@ -38,6 +38,11 @@ impl Item {
         EvolveOptions { input, outputs, tracer, ..(*self.common).clone() }
     }
 
+    /// All files that are read for it.
+    pub(super) fn files_read(&self) -> impl Iterator<Item = &Path> {
+        self.common.shared_inputs().chain([self.input.as_path()])
+    }
+
     /// How it evolves.
     pub(super) fn scheme(&self) -> SchemeName {
         match self.common.scheme {
@@ -111,7 +116,7 @@ pub(super) fn gather(
     let ids = ids(&named)?;
     let finish = |(index, (draft, id)): (usize, (Draft, String))| finish(draft, id, index, naming);
     let items = drafts.into_iter().zip(ids).enumerate().map(finish).collect::<Result<Vec<Item>>>()?;
-    check_places(&items)?;
+    check_places(&items, manifest)?;
     check_order(&items)?;
     Ok(items)
 }
@@ -181,15 +186,16 @@ fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result
     Ok(Item { id, input, outputs, group, after, common, row })
 }
 
-/// Refuses outputs in the place of an input or of one another.
-fn check_places(items: &[Item]) -> Result<()> {
-    let inputs: HashSet<PathBuf> = items.iter().map(|item| only_place_of(&item.input)).collect();
+/// Refuses outputs in the place of a file that is read, or of one another.
+fn check_places(items: &[Item], manifest: &Path) -> Result<()> {
+    let inputs: HashSet<&Path> = items.iter().flat_map(Item::files_read).chain([manifest]).collect();
+    let inputs: HashSet<PathBuf> = inputs.into_iter().map(only_place_of).collect();
     let mut written: HashMap<PathBuf, &Item> = HashMap::new();
     for item in items {
         for output in &item.outputs {
             let (place, path) = (only_place_of(&output.path), output.path.display());
             if inputs.contains(&place) {
-                return Err(Error::Usage(format!("{path} is an input; name another folder for the outputs")));
+                return Err(Error::Usage(format!("{path} is an input; name another place for the output")));
             }
             if let Some(other) = written.insert(place, item) {
                 return Err(Error::Usage(format!(

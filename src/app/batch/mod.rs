@@ -7,6 +7,7 @@ mod items;
 mod manifest;
 mod name;
 mod pipeline;
+mod places;
 mod queue;
 mod schedule;
 mod summary;
@@ -26,12 +27,12 @@ use self::items::{Item, Naming};
 pub(super) use self::manifest::ManifestRow;
 use self::name::NameTemplate;
 use self::pipeline::{Pipeline, Told};
+use self::places::Taken;
 use self::schedule::Schedule;
 use self::summary::Summary;
 use self::threads::IoThreads;
 use super::cli::{Cli, MessageArgs};
 use super::computing::{ComputingArgs, DevicesArg};
-use super::destination::place_of;
 use super::inputs::{self, Depth, Givers};
 use super::inside::{self, Tracer};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
@@ -42,7 +43,7 @@ use super::report::{self, Row, Status};
 use super::shard::{self, ShardChoice};
 use super::{memory, values};
 use crate::error::{Error, Result};
-use crate::output::{self, Journal};
+use crate::output::Journal;
 use crate::vk::Validation;
 
 /// Exit code of a batch of which some pictures failed.
@@ -149,6 +150,14 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
     }
     let items = find(args, cli)?;
     let all = items.len();
+    let results = args.results.clone().unwrap_or_else(|| {
+        let name = shard.map_or("results.jsonl".to_owned(), |shard| {
+            format!("results.{}-of-{}.jsonl", shard.index(), shard.count())
+        });
+        args.output.join(name)
+    });
+    // Also of pictures that are in another shard.
+    let taken = Taken::new(&items, args);
     let items = match shard {
         Some(shard) => {
             let groups: Vec<Option<&str>> = items.iter().map(|item| item.group.as_deref()).collect();
@@ -160,20 +169,16 @@ fn run(args: &BatchArgs, cli: &Cli) -> Result<u8> {
     if args.dry_run {
         return list(&items, args).map(|()| 0);
     }
-    let results = args.results.clone().unwrap_or_else(|| {
-        let name = shard.map_or("results.jsonl".to_owned(), |shard| {
-            format!("results.{}-of-{}.jsonl", shard.index(), shard.count())
-        });
-        args.output.join(name)
-    });
-    check_results(&results, args, &items)?;
-    let mut journal = prepare_output(args, &items, &results)?;
+    taken.check_results(&results)?;
+    let mut journal = places::prepare(args, &items, &results)?;
     if verbosity > Verbosity::Quiet && shard.is_some() {
         report::say(&format!("smalti: {} of {all} pictures are in this shard", items.len()));
     }
     computing.start_threads()?;
-    let taken: Vec<&Path> = items.iter().map(|item| item.input.as_path()).chain([results.as_path()]).collect();
-    let begin = |path: &PathBuf| inside::begin_trace(path, &taken, Overwrite::Refuse);
+    let begin = |path: &PathBuf| {
+        taken.check("--trace", path)?;
+        inside::begin_trace(path, &[&results], Overwrite::Refuse)
+    };
     let tracer = args.trace.as_ref().map(begin).transpose()?.unwrap_or_default();
     let workers = threads::workers(args, &computing, items.len())?;
     if verbosity > Verbosity::Quiet {
@@ -245,24 +250,6 @@ fn find(args: &BatchArgs, cli: &Cli) -> Result<Vec<Item>> {
     Ok(items)
 }
 
-/// Refuses a file of the results that is something else: lines would be added to it.
-fn check_results(results: &Path, args: &BatchArgs, items: &[Item]) -> Result<()> {
-    if results == Path::new("-") {
-        return Err(Error::Usage("--results - is no file; name one, and print the lines with --json".to_owned()));
-    }
-    let place = place_of(results);
-    let manifest = args.manifest.iter().map(PathBuf::as_path);
-    let inputs = items.iter().map(|item| item.input.as_path()).chain(manifest);
-    let outputs = items.iter().flat_map(|item| &item.outputs).map(|output| output.path.as_path());
-    match inputs.chain(outputs).find(|&path| place_of(path) == place) {
-        Some(path) => Err(Error::Usage(format!(
-            "--results: {} is read or written by the batch; name another file",
-            path.display()
-        ))),
-        None => Ok(()),
-    }
-}
-
 /// The formats as endings without a dot, each once.
 fn check_formats(formats: &[String]) -> Result<Vec<String>> {
     let formats: Vec<String> = formats.iter().map(|format| format.trim_start_matches('.').to_lowercase()).collect();
@@ -303,22 +290,6 @@ pub(super) fn planned(args: &BatchArgs, cli: &Cli) -> Result<Vec<Planned>> {
 pub(super) fn ids(path: &Path) -> Result<Vec<String>> {
     let rows: Vec<ManifestRow> = manifest::read(path)?.into_iter().map(|(_, row)| row).collect();
     items::ids_of_rows(&rows)
-}
-
-/// Makes the output folder, takes away what killed processes left in it, and opens the file of the results.
-fn prepare_output(args: &BatchArgs, items: &[Item], results: &Path) -> Result<Journal> {
-    std::fs::create_dir_all(&args.output).map_err(|error| {
-        Error::output(&args.output, format!("the folder cannot be created ({error}); name another one"))
-    })?;
-    output::check_folder_writable(&args.output)?;
-    let outputs = items.iter().flat_map(|item| &item.outputs).map(|output| output.path.as_path());
-    let folders: HashSet<&Path> = outputs.filter_map(Path::parent).collect();
-    folders
-        .iter()
-        .chain([&args.output.as_path()])
-        .filter(|folder| folder.is_dir())
-        .try_for_each(|folder| output::sweep(folder))?;
-    Journal::open(results)
 }
 
 /// Runs the pipeline, writes a row for each picture, and shows how far it is.

@@ -3,9 +3,9 @@
 mod rows;
 mod table;
 
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -20,6 +20,8 @@ use crate::output;
 const EXIT_SOME_FAILED: u8 = 3;
 /// Most pictures that are named in one message.
 const NAMED_MAX: usize = 10;
+/// More than a row ever has.
+const ROW_BYTES_MAX: u64 = 1 << 20;
 
 const AFTER_HELP: &str = "\
 Of several rows of one picture, the last of a file counts; between files a row that tells of a success (complete, unchanged,
@@ -74,7 +76,7 @@ pub(super) fn merge(args: &MergeArgs) -> ExitCode {
 
 fn merge_all(args: &MergeArgs) -> Result<ExitCode> {
     let expected = expected_ids(&args.manifests)?;
-    let files = result_files(&args.results)?;
+    let files = result_files(&args.results, &args.output)?;
     check_output(args, &files)?;
     let mut rows = Rows::default();
     for file in &files {
@@ -119,9 +121,12 @@ fn tell_missing(missing: &[&str], expected_count: usize) {
     report::say(&format!("missing {} of {expected_count} pictures: {named}{more}", missing.len()));
 }
 
-/// The files that were named, and in place of each folder those in it that hold rows by their names, in natural order.
-fn result_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+/// The files that were named, and in place of each folder those in it that hold rows by their names, in natural order. An
+/// earlier `output` is none of those, unless it has a name that a batch gives.
+fn result_files(paths: &[PathBuf], output: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
+    let own_name = output.file_name().filter(|name| !is_stdout(output) && !is_name_of_batch(name));
+    let own_place = destination::place_of(output);
     for path in paths {
         if !path.is_dir() {
             files.push(path.clone());
@@ -129,6 +134,10 @@ fn result_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
         }
         let entries = fs::read_dir(path).map_err(|error| Error::input(path, format!("cannot be read ({error})")))?;
         let names = entries.flatten().map(|entry| entry.file_name()).filter(|name| is_results_name(name));
+        let is_own = |name: &OsString| {
+            Some(name.as_os_str()) == own_name && destination::place_of(&path.join(name)) == own_place
+        };
+        let names = names.filter(|name| !is_own(name));
         let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
         names.sort_by(|a, b| natord::compare(a, b));
         if names.is_empty() {
@@ -141,6 +150,16 @@ fn result_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 
 fn is_results_name(name: &OsStr) -> bool {
     name.to_str().is_some_and(|name| name.starts_with("results") && name.ends_with(".jsonl"))
+}
+
+/// Whether `smalti batch` calls its results so unless told otherwise: `results.jsonl`, or `results.K-of-N.jsonl` of a shard.
+fn is_name_of_batch(name: &OsStr) -> bool {
+    let is_number = |text: &str| text.parse::<u32>().is_ok();
+    let part = name.to_str().and_then(|name| name.strip_prefix("results")?.strip_suffix(".jsonl"));
+    part.is_some_and(|part| {
+        let shard = part.strip_prefix('.').and_then(|shard| shard.split_once("-of-"));
+        part.is_empty() || shard.is_some_and(|(index, count)| is_number(index) && is_number(count))
+    })
 }
 
 fn format(args: &MergeArgs) -> Format {
@@ -170,6 +189,16 @@ fn check_output(args: &MergeArgs, files: &[PathBuf]) -> Result<()> {
         "{} exists and holds no merged rows; name another file, or replace it with --force",
         path.display()
     )))
+}
+
+/// Whether a file is empty, or begins as one of result rows does, be it that a process was killed at the first.
+pub(super) fn holds_result_rows(path: &Path) -> bool {
+    let mut head = Vec::new();
+    let Ok(file) = File::open(path) else { return false };
+    if BufReader::new(file.take(ROW_BYTES_MAX)).read_until(b'\n', &mut head).is_err() {
+        return false;
+    }
+    head.is_empty() || rows::is_row_or_torn(head.trim_ascii())
 }
 
 /// Whether a file is empty, or begins as a file of rows in one of the formats does.

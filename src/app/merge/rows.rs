@@ -6,6 +6,7 @@ use std::io;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use crate::error::{Error, Result};
 
@@ -52,31 +53,39 @@ impl Rows {
     /// that of the file that was read last.
     ///
     /// # Errors
-    /// [`Error::Input`] if the file cannot be read, or has lines of which none is a row.
+    /// [`Error::Input`] if the file cannot be read, has lines of which none is a row, or one that never was the beginning of a
+    /// row.
     pub(super) fn read(&mut self, path: &Path) -> Result<Vec<String>> {
         let bytes = fs::read(path).map_err(|error| Error::input(path, unreadable(&error)))?;
         let file_name = path.file_name().unwrap_or_default().to_string_lossy();
         let mut last_of_id = HashMap::new();
         let mut warnings = Vec::new();
-        for (number, line) in (1..).zip(bytes.split(|&byte| byte == b'\n')) {
-            let line = line.trim_ascii();
-            if line.is_empty() {
-                continue;
-            }
+        let mut foreign = None;
+        let lines = (1..).zip(bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii));
+        let lines: Vec<(usize, &[u8])> = lines.filter(|(_, line)| !line.is_empty()).collect();
+        for &(number, line) in &lines {
             if let Some((told, line)) = row(line) {
                 let row = ResultRow { told, line, file_name: file_name.to_string() };
                 last_of_id.insert(row.told.id.clone(), row);
             } else {
+                let is_last = lines.last().is_some_and(|(last, _)| *last == number);
+                if !is_torn(line) && (!is_last || last_of_id.is_empty()) {
+                    foreign.get_or_insert(number);
+                }
                 let path = path.display();
                 warnings.push(format!("{path}: line {number} is no whole row, as after a kill, and is skipped"));
             }
         }
         // One torn line may be all that a process left which was killed at its first picture.
-        if last_of_id.is_empty() && warnings.len() > 1 {
+        if last_of_id.is_empty() && (warnings.len() > 1 || foreign.is_some()) {
             return Err(Error::input(
                 path,
                 "holds no rows of results; name a file that smalti batch wrote, as results.jsonl",
             ));
+        }
+        if let Some(number) = foreign {
+            let reason = format!("line {number} is no row of results; name files that smalti batch wrote");
+            return Err(Error::input(path, reason));
         }
         last_of_id.into_values().for_each(|row| self.take(row));
         Ok(warnings)
@@ -115,6 +124,16 @@ fn row(line: &[u8]) -> Option<(Told, String)> {
 /// Whether a line is a row of results.
 pub(super) fn is_row(line: &str) -> bool {
     row(line.as_bytes()).is_some()
+}
+
+/// Whether a line is a row, or the beginning of one.
+pub(super) fn is_row_or_torn(line: &[u8]) -> bool {
+    row(line).is_some() || is_torn(line)
+}
+
+/// Whether a line is the beginning of an object of JSON, and not the whole.
+fn is_torn(line: &[u8]) -> bool {
+    line.starts_with(b"{") && serde_json::from_slice::<IgnoredAny>(line).is_err()
 }
 
 fn unreadable(error: &io::Error) -> String {
@@ -203,6 +222,22 @@ mod tests {
         assert!(warnings[0].contains("0.jsonl: line 3 is no whole row"), "{warnings:?}");
         // All that a process left which was killed at once, and nothing at all.
         assert_eq!(merged(&["{\"id\":\"a".to_owned(), String::new()]).1.len(), 1);
+    }
+
+    #[test]
+    fn only_the_last_line_or_one_that_begins_as_json_may_be_torn() {
+        let whole = line("a", "complete", 0.0);
+        assert_eq!(merged(&[format!("{whole}\n{{\"id\":\"b\n{whole}\n")]).1.len(), 1);
+        assert_eq!(merged(&[format!("{whole}\n\0\0\0")]).1.len(), 1, "as some file systems leave it");
+        for (text, told) in [
+            (format!("{whole}\nDear diary\n{whole}\n"), "line 2 is no row of results"),
+            ("Dear diary\n".to_owned(), "holds no rows"),
+            ("{\"input\": \"a.png\"}\n".to_owned(), "holds no rows"),
+        ] {
+            let (_folder, paths) = files(&[text]);
+            let refusal = Rows::default().read(&paths[0]).expect_err("it is prose").to_string();
+            assert!(refusal.contains(told), "{refusal}");
+        }
     }
 
     #[test]

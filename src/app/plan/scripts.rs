@@ -9,6 +9,10 @@ use std::fmt::Write;
 const DIGITS_MIN: usize = 4;
 /// Most pods at a time that a job of Kubernetes asks for unless it is edited.
 const PARALLELISM_MAX: u32 = 8;
+/// What keeps the configuration of whoever runs a script out of it.
+const OWN_FLAGS_ONLY: &str = "\
+# All flags are written out below.
+unset SMALTI_CONFIG";
 
 /// What the scripts run.
 #[derive(Clone, Debug)]
@@ -54,6 +58,13 @@ impl Plan {
         text
     }
 
+    /// A line that ends the arguments in a task of Slurm, with as many threads as the task has processors, unless the plan says
+    /// how many.
+    fn slurm_threads(&self) -> &'static str {
+        let is_said = self.flags.iter().any(|flag| flag == "--threads" || flag.starts_with("--threads="));
+        if is_said { "" } else { " \\\n    ${SLURM_CPUS_PER_TASK:+--threads \"$SLURM_CPUS_PER_TASK\"}" }
+    }
+
     fn heading(&self, how: &str) -> String {
         let version = env!("CARGO_PKG_VERSION");
         format!("# Written by smalti {version}: {} pictures in {} shards.\n{how}", self.item_count, self.shard_count)
@@ -70,6 +81,7 @@ impl Plan {
         let log = format!("{}/slurm-%A_%a.log", self.absolute(&self.folder).replace('%', "%%"));
         let work_folder = quoted(&self.work_folder);
         let arguments = self.arguments("    ");
+        let threads = self.slurm_threads();
         format!(
             r#"#!/bin/bash
 {heading}
@@ -83,10 +95,10 @@ impl Plan {
 #SBATCH --signal=B:USR1@60
 
 cd {work_folder} || exit 1
+{OWN_FLAGS_ONLY}
 index=$SLURM_ARRAY_TASK_ID
 shard=$(printf '%0{digits}d' "$index")
-"${{SMALTI:-smalti}}" {arguments} \
-    ${{SLURM_CPUS_PER_TASK:+--threads "$SLURM_CPUS_PER_TASK"}} &
+"${{SMALTI:-smalti}}" {arguments}{threads} &
 pid=$!
 cancelled=no
 trap 'trapped=yes; kill -USR1 "$pid" 2>/dev/null' USR1
@@ -117,7 +129,7 @@ exit "$code"
         let work_folder = json(&self.work_folder);
         let mut script = String::new();
         let command = format!(
-            "index=$((JOB_COMPLETION_INDEX + 1))\nshard=$(printf '%0{digits}d' \"$index\")\nexec smalti {}",
+            "{OWN_FLAGS_ONLY}\nindex=$((JOB_COMPLETION_INDEX + 1))\nshard=$(printf '%0{digits}d' \"$index\")\nexec smalti {}",
             self.arguments("  ")
         );
         for line in command.lines() {
@@ -192,6 +204,7 @@ spec:
             r#"#!/bin/sh
 {heading}
 cd {work_folder} || exit 1
+{OWN_FLAGS_ONLY}
 if [ "$1" = --shard ]; then
     index=$2
     shard=$(printf '%0{digits}d' "$index")
@@ -269,6 +282,14 @@ mod tests {
             let checked = Command::new(shell).args(["-n", "-c", &script]).stderr(Stdio::inherit()).status();
             assert!(checked.expect("there is a shell").success(), "{script}");
         }
+    }
+
+    #[test]
+    fn threads_are_said_once_by_the_plan_or_else_by_slurm() {
+        assert_eq!(plan().slurm().matches("--threads").count(), 1);
+        let said = Plan { flags: vec!["--threads=2".to_owned()], ..plan() };
+        let script = said.slurm();
+        assert!(script.contains("--threads=2 &\n") && !script.contains("SLURM_CPUS_PER_TASK"), "{script}");
     }
 
     #[test]

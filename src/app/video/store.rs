@@ -5,12 +5,12 @@ use std::path::PathBuf;
 
 use super::options::VideoOptions;
 use super::plan::Planned;
-use crate::app::destination::Destination;
+use crate::app::destination::{self, Destination};
 use crate::app::options::Overwrite;
 use crate::app::provenance;
 use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
-use crate::{output, photo};
+use crate::photo;
 
 /// Digits of the number in a name.
 const DIGITS: usize = 6;
@@ -42,7 +42,7 @@ impl Store {
         for folder in self.folder.iter().chain([&self.populations]) {
             fs::create_dir_all(folder)
                 .map_err(|error| Error::output(folder, format!("cannot be created as a folder ({error})")))?;
-            output::sweep(folder)?;
+            destination::sweep(folder)?;
         }
         Ok(())
     }
