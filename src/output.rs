@@ -7,13 +7,15 @@ use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf, is_separator};
 
-use tempfile::NamedTempFile;
+use tempfile::{Builder, NamedTempFile, TempDir};
 
 use crate::error::{Error, Result};
 
 /// How the names of temporary files begin and end.
 const PREFIX: &str = ".smalti-";
 const SUFFIX: &str = ".partial";
+/// The file in a temporary folder that its process holds locked.
+const LOCK: &str = ".lock";
 
 /// Writes `bytes` to `path`, replacing what is there in one step.
 ///
@@ -110,6 +112,58 @@ impl PartialFile {
     pub fn commit(self) -> Result<()> {
         let Self { path, target, old, file } = self;
         persist(file, &target, old.as_ref(), Durability::OnDisk).map_err(|error| output_error(&path, &error))
+    }
+}
+
+/// A folder that fills up beside its target, and takes its name only when it is whole. Dropped before that, it goes away.
+#[derive(Debug)]
+pub struct PartialFolder {
+    folder: TempDir,
+    lock: File,
+}
+
+impl PartialFolder {
+    /// An empty folder in `parent`, which is there.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if `parent` cannot be written to.
+    pub fn create_in(parent: &Path) -> Result<Self> {
+        let create = || loop {
+            let folder = names(0o777).tempdir_in(parent)?;
+            match File::create_new(folder.path().join(LOCK)) {
+                Ok(lock) if is_held(&lock, &folder.path().join(LOCK)) => return Ok(Self { folder, lock }),
+                // Whoever sweeps found it before it was locked.
+                Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+            }
+        };
+        create().map_err(|error| output_error(parent, &error))
+    }
+
+    /// Where the folder is while it fills up.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Gives the folder the name `target`, in one step; gives it back if something is there that is no empty folder.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if it cannot be renamed.
+    pub fn commit(self, target: &Path) -> Result<Option<Self>> {
+        use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty, NotADirectory};
+        match fs::rename(self.path(), target) {
+            Ok(()) => {
+                // Not before: without its lock, it would be swept.
+                drop(self.lock);
+                let _ = self.folder.keep();
+                let _ = fs::remove_file(target.join(LOCK));
+                Ok(None)
+            }
+            Err(error) if matches!(error.kind(), AlreadyExists | DirectoryNotEmpty | NotADirectory) => Ok(Some(self)),
+            Err(error) => Err(output_error(target, &error)),
+        }
     }
 }
 
@@ -232,30 +286,32 @@ fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
 }
 
 fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(PREFIX).suffix(SUFFIX);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // The umask takes its bits away, as for any file that a program creates.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
     loop {
-        let file = builder.tempfile_in(folder)?;
-        // Whoever sweeps may have found it before it was locked, and then it is about to go.
-        let is_ours = match file.as_file().try_lock() {
-            Ok(()) => true,
-            Err(TryLockError::WouldBlock) => false,
-            // Some file systems have no locks; there nothing is swept.
-            Err(TryLockError::Error(_)) => true,
-        };
-        if is_ours && file.path().exists() {
+        let file = names(0o666).tempfile_in(folder)?;
+        if is_held(file.as_file(), file.path()) {
             return Ok(file);
         }
     }
 }
 
-/// Removes the temporary files that processes left in `folder` when they were killed. Those of living processes are locked, and
+/// How temporary files and folders are named, and what may be done with them, less what the umask takes away.
+fn names(mode: u32) -> Builder<'static, 'static> {
+    let mut builder = Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
+    #[cfg(not(unix))]
+    let _ = mode;
+    builder
+}
+
+/// Locks a file that was just made; false if whoever sweeps found it before, and then it is about to go.
+fn is_held(file: &File, path: &Path) -> bool {
+    // Some file systems have no locks; there nothing is swept.
+    !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) && path.exists()
+}
+
+/// Removes the temporary files and folders that processes left in `folder` when they were killed. Those of living processes are locked, and
 /// stay, and so do those that belong to somebody else.
 ///
 /// # Errors
@@ -267,9 +323,12 @@ pub fn sweep(folder: &Path) -> Result<()> {
             let name = entry.file_name();
             let name = name.as_encoded_bytes();
             let is_named_so = name.starts_with(PREFIX.as_bytes()) && name.ends_with(SUFFIX.as_bytes());
+            let kind = entry.file_type()?;
+            if is_named_so && kind.is_dir() {
+                pass_over_others(remove_folder_unless_in_use(&entry.path()))?;
             // To open a pipe would wait for its writer.
-            if is_named_so && entry.file_type()?.is_file() {
-                remove_unless_in_use(&entry.path())?;
+            } else if is_named_so && kind.is_file() {
+                pass_over_others(remove_unless_in_use(&entry.path()))?;
             }
         }
         Ok(())
@@ -278,11 +337,32 @@ pub fn sweep(folder: &Path) -> Result<()> {
 }
 
 fn remove_unless_in_use(path: &Path) -> io::Result<()> {
-    let remove = || -> io::Result<()> {
-        let file = File::open(path)?;
-        if file.try_lock().is_ok() { fs::remove_file(path) } else { Ok(()) }
+    let file = File::open(path)?;
+    if file.try_lock().is_ok() { fs::remove_file(path) } else { Ok(()) }
+}
+
+fn remove_folder_unless_in_use(path: &Path) -> io::Result<()> {
+    let lock = match File::options().read(true).write(true).open(path.join(LOCK)) {
+        Ok(lock) => lock,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            // Its process has not come to lock it, and never will if it was killed. What is in use is not empty.
+            let _ = fs::remove_dir(path);
+            return Ok(());
+        }
+        Err(error) => return Err(error),
     };
-    remove().or_else(|error| match error.kind() {
+    if lock.try_lock().is_err() {
+        return Ok(());
+    }
+    match fs::remove_dir_all(path) {
+        // A child of the killed process still writes into it. The next time it may be over.
+        Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => File::create(path.join(LOCK)).map(drop),
+        removed => removed,
+    }
+}
+
+fn pass_over_others(removed: io::Result<()>) -> io::Result<()> {
+    removed.or_else(|error| match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied => Ok(()),
         _ => Err(error),
     })
@@ -354,7 +434,13 @@ mod tests {
             fs::write(path, b"half").expect("the folder is ours");
         }
         let growing = PartialFile::create(&folder.path().join("out.png")).expect("the folder is ours");
+        let left_folder = folder.path().join(".smalti-def.partial");
+        fs::create_dir(&left_folder).expect("the folder is ours");
+        ["1.png", LOCK].map(|name| fs::write(left_folder.join(name), b"half").expect("the folder is ours"));
+        let filling = PartialFolder::create_in(folder.path()).expect("the folder is ours");
         sweep(folder.path()).expect("the folder is ours");
+        assert!(!left_folder.exists() && filling.path().exists());
+        assert!(filling.commit(&folder.path().join("frames")).expect("nothing is there").is_none());
         assert!(!left.exists() && other.exists() && growing.growing_path().exists());
         growing.commit().expect("nothing took it away");
         assert!(folder.path().join("out.png").exists());
