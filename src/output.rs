@@ -435,8 +435,9 @@ mod tests {
         }
         let growing = PartialFile::create(&folder.path().join("out.png")).expect("the folder is ours");
         let left_folder = folder.path().join(".smalti-def.partial");
-        fs::create_dir(&left_folder).expect("the folder is ours");
-        ["1.png", LOCK].map(|name| fs::write(left_folder.join(name), b"half").expect("the folder is ours"));
+        let fill =
+            |()| fs::write(left_folder.join(LOCK), b"").and_then(|()| fs::write(left_folder.join("1.png"), b"half"));
+        fs::create_dir(&left_folder).and_then(fill).expect("the folder is ours");
         let filling = PartialFolder::create_in(folder.path()).expect("the folder is ours");
         sweep(folder.path()).expect("the folder is ours");
         assert!(!left_folder.exists() && filling.path().exists());

@@ -6,7 +6,7 @@
 use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -163,7 +163,7 @@ impl Kept<'_> {
         Frames { paths, frames_per_s: index.frames_per_s }
     }
 
-    fn entry(&self, path: &PathBuf) -> Result<Entry> {
+    fn entry(&self, path: &Path) -> Result<Entry> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let bytes = path.metadata().map_err(|error| Error::input(path, photo::why_unreadable(&error)))?.len();
         Ok(Entry { name, bytes, sha256: self.sha256_of(path)? })
