@@ -1,5 +1,7 @@
 //! What `evolve` and `render` write: a population, drawn as its outputs need it, then encoded, then written.
 
+use std::path::Path;
+
 use serde_json::{Map, Value};
 
 use super::destination::{Content, Destination};
@@ -166,6 +168,15 @@ pub(super) fn write(files: &[EncodedFile<'_>], interrupt: &Interrupt, written: &
         outcome = outcome.and(one);
     }
     outcome
+}
+
+/// Whether a file that does not tell that smalti made it is what is left of an output that was cut short: `bytes`, which are to be
+/// written now, begin with it, and zeros may follow that a file system put there.
+pub(super) fn is_left_of(path: &Path, bytes: &[u8]) -> bool {
+    std::fs::read(path).is_ok_and(|old| {
+        let length = old.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+        bytes.starts_with(&old[..length])
+    })
 }
 
 #[cfg(test)]

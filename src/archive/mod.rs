@@ -15,7 +15,7 @@ use serde_json::{Map, Value};
 use crate::model::{Blend, Grout, Population, Rgb};
 
 pub use encode::{encode, encode_snapshot};
-pub use read::{read, read_meta};
+pub use read::{is_cut_short, read, read_meta};
 pub use table::{KEY_DIGITS, encode_csv, encode_json, read_csv_meta, read_json_meta};
 
 /// Version of the file's layout.

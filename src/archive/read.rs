@@ -49,6 +49,20 @@ pub fn read_meta(path: &Path) -> Result<Map<String, Value>> {
         .map_err(|reason| Error::input(path, reason))
 }
 
+/// Whether the file at `path` could be the beginning of an `.npz` file, perhaps with zeros after it: it lacks the list of members,
+/// with which such files end.
+#[must_use]
+pub fn is_cut_short(path: &Path) -> bool {
+    const BEGIN: [u8; 4] = *b"PK\x03\x04";
+    let Ok(mut file) = File::open(path) else { return false };
+    let mut begin = Vec::new();
+    if file.by_ref().take(BEGIN.len() as u64).read_to_end(&mut begin).is_err() {
+        return false;
+    }
+    let length = begin.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    BEGIN.starts_with(&begin[..length]) && ZipArchive::new(BufReader::new(file)).is_err()
+}
+
 fn read_population(path: &Path) -> Result<Archive, String> {
     let mut members = Members::open(path)?;
     let header = members.header()?;

@@ -201,15 +201,145 @@ fn animations_show_the_frames_and_need_no_folder() {
     assert_eq!(frames.len(), 3);
 }
 
-#[test]
-fn a_video_is_taken_apart_by_ffmpeg_and_put_together_again() {
-    let workshop = with_frames(4, 99);
+/// Makes a video of `frames/`.
+fn encode(workshop: &Workshop, name: &str) {
     let made = std::process::Command::new("ffmpeg")
         .args(["-loglevel", "error", "-framerate", "8", "-start_number", "5", "-i", "frames/f%d.png"])
-        .args(["-c:v", "libx264", "-crf", "1", "-pix_fmt", "yuv444p", "clip.mp4"])
+        .args(["-c:v", "libx264", "-crf", "1", "-pix_fmt", "yuv444p", name])
         .current_dir(workshop.path("."))
         .status();
     assert!(made.expect("the tests need ffmpeg; tools/test installs it").success());
+}
+
+fn succeeds(workshop: &Workshop, line: &str) {
+    let ran = workshop.run(line);
+    assert_eq!(ran.code, Some(0), "{line}: {}", ran.stderr);
+}
+
+#[test]
+fn damaged_frames_of_a_video_are_taken_from_it_again() {
+    let workshop = with_frames(3, 99);
+    encode(&workshop, "clip.mp4");
+    let line = format!("video clip.mp4 {SMALL} -o out");
+    succeeds(&workshop, &line);
+    let whole = files(&workshop, "out");
+    assert_eq!(whole.len(), 3 + 3 + 3 + 1);
+    let [cut, changed, gone] = [1, 2, 3].map(|number| format!("out/populations/input/0000000{number}.png"));
+    let bytes = workshop.read(&cut);
+    workshop.write(&cut, &bytes[..bytes.len() / 2]);
+    let mut bytes = workshop.read(&changed);
+    bytes[60] ^= 1;
+    workshop.write(&changed, &bytes);
+    std::fs::remove_file(workshop.path(&gone)).unwrap();
+    succeeds(&workshop, &line);
+    assert!(files(&workshop, "out") == whole, "{:?}", files(&workshop, "out").keys());
+}
+
+#[test]
+fn frames_of_another_video_make_room_and_pictures_of_the_user_do_not() {
+    let workshop = with_frames(4, 99);
+    encode(&workshop, "long.mp4");
+    std::fs::remove_file(workshop.path("frames/f8.png")).unwrap();
+    encode(&workshop, "short.mp4");
+    let kept = "out/populations/input";
+    let line = |clip: &str| format!("video {clip}.mp4 {SMALL} --force -o out");
+    std::fs::create_dir_all(workshop.path(kept)).unwrap();
+    workshop.paint(&format!("{kept}/mine.png"), 8, 8);
+    let before = files(&workshop, "out");
+    refused(&workshop, &line("long"), 2, "mine.png is where frames of the video go, and smalti did not put it there");
+    assert!(files(&workshop, "out") == before);
+    std::fs::remove_file(workshop.path(&format!("{kept}/mine.png"))).unwrap();
+    succeeds(&workshop, &line("long"));
+    assert_eq!(files(&workshop, kept).len(), 4 + 1);
+    succeeds(&workshop, &line("short"));
+    assert_eq!(files(&workshop, kept).len(), 3 + 1);
+    workshop.paint(&format!("{kept}/mine.png"), 8, 8);
+    let before = files(&workshop, "out");
+    refused(&workshop, &line("long"), 2, "mine.png is where frames of the video go");
+    assert!(files(&workshop, "out") == before);
+}
+
+#[test]
+fn shots_of_one_video_may_be_made_at_once_in_one_folder() {
+    let workshop = with_frames(6, 3);
+    encode(&workshop, "clip.mp4");
+    succeeds(&workshop, &format!("video clip.mp4 {SMALL} -o whole"));
+    let shots = ["0..3", "3..6"]
+        .map(|span| workshop.command(&format!("video clip.mp4 {SMALL} -o shots --frames {span}")).spawn().unwrap());
+    for shot in shots {
+        let ended = shot.wait_with_output().unwrap();
+        assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
+    }
+    assert!(files(&workshop, "shots") == files(&workshop, "whole"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_ffmpeg_too_and_what_a_killed_process_left_goes_away() {
+    use std::os::unix::fs::PermissionsExt;
+    let workshop = with_frames(2, 99);
+    encode(&workshop, "clip.mp4");
+    std::fs::create_dir(workshop.path("bin")).unwrap();
+    // It tells its number, and does not end within the test.
+    workshop.write("bin/ffmpeg", b"#!/bin/sh\necho $$ > started.new\nmv started.new started\nexec sleep 20\n");
+    std::fs::set_permissions(workshop.path("bin/ffmpeg"), std::fs::Permissions::from_mode(0o755)).unwrap();
+    let path = format!("{}:{}", workshop.path("bin").display(), std::env::var("PATH").unwrap());
+    let line = format!("video clip.mp4 {SMALL} -o out");
+    let is_running = |number: &str| {
+        let status = std::process::Command::new("sh").args(["-c", &format!("kill -0 {number} 2>&-")]).status();
+        status.unwrap().success()
+    };
+    let left = || std::fs::read_dir(workshop.path("out/populations")).unwrap().count();
+    for (signal, code) in [("TERM", Some(75)), ("KILL", None)] {
+        let mut child = workshop.command(&line).env("PATH", &path).spawn().unwrap();
+        while !workshop.path("started").exists() {
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        let number = String::from_utf8(workshop.read("started")).unwrap().trim().to_owned();
+        std::fs::remove_file(workshop.path("started")).unwrap();
+        assert!(is_running(&number));
+        send(signal, &child);
+        assert_eq!(child.wait().unwrap().code(), code, "{signal}");
+        assert_eq!((is_running(&number), left()), (code.is_none(), usize::from(code.is_none())), "{signal}");
+    }
+    succeeds(&workshop, &line);
+    assert!(files(&workshop, "out").keys().all(|name| !name.contains(".smalti-")));
+}
+
+#[test]
+fn a_population_that_smalti_did_not_make_stays() {
+    let workshop = with_frames(2, 99);
+    let line = format!("video frames {SMALL} -o out");
+    succeeds(&workshop, &line);
+    let whole = files(&workshop, "out");
+    let name = "out/populations/000001.npz";
+    let mut zip = workshop.read("out/populations/000000.npz");
+    // A zip file whose members have other names.
+    for at in 0..zip.len() - 9 {
+        if zip[at..].starts_with(b"meta.json") {
+            zip[at] = b'b';
+        }
+    }
+    let half = workshop.read("out/populations/000000.npz");
+    for foreign in [&zip[..], b"my own", &half[..half.len() / 2]] {
+        workshop.write(name, foreign);
+        refused(&workshop, &line, 2, "000001.npz exists and was not made by smalti");
+        assert!(workshop.read(name) == foreign);
+    }
+    // What is left of the file itself, as a file system may leave it.
+    let ours = &whole["populations/000001.npz"];
+    workshop.write(name, &[&ours[..ours.len() / 3], &[0; 99][..]].concat());
+    succeeds(&workshop, &line);
+    assert!(files(&workshop, "out") == whole);
+    workshop.write(name, b"my own");
+    succeeds(&workshop, &format!("{line} --force"));
+    assert!(files(&workshop, "out") == whole);
+}
+
+#[test]
+fn a_video_is_taken_apart_by_ffmpeg_and_put_together_again() {
+    let workshop = with_frames(4, 99);
+    encode(&workshop, "clip.mp4");
     let line = format!("video clip.mp4 {SMALL} -o made.mp4");
     for _ in 0..2 {
         let ran = workshop.run(&line);

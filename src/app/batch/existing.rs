@@ -10,6 +10,7 @@ use serde_json::{Map, Value};
 
 use crate::app::destination::{Content, Destination};
 use crate::app::options::EvolveOptions;
+use crate::app::outputs;
 use crate::app::prepared::Prepared;
 use crate::app::provenance::{self, Story};
 use crate::archive;
@@ -125,11 +126,7 @@ pub(super) fn check_remade(output: &Destination, bytes: &[u8], on_exists: OnExis
     if on_exists == OnExists::Overwrite || !output.path.is_file() || provenance::told_by_file(output).is_some() {
         return Ok(());
     }
-    let is_left_of_it = read(output).is_some_and(|old| {
-        let length = old.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
-        bytes.starts_with(&old[..length])
-    });
-    if is_left_of_it { Ok(()) } else { Err(foreign(output)) }
+    if outputs::is_left_of(&output.path, bytes) { Ok(()) } else { Err(foreign(output)) }
 }
 
 fn foreign(output: &Destination) -> Error {

@@ -174,6 +174,7 @@ impl<'a> Shooter<'a> {
         drawn.draw(&mut *self.evaluator, &destinations, Verbosity::Quiet)?;
         let destinations: Vec<_> = destinations.iter().collect();
         let files: Vec<EncodedFile<'_>> = outputs::encode(&destinations, drawn, &told)?;
+        files.iter().try_for_each(|file| self.store.check_remade(file))?;
         outputs::write(&files, watcher.interrupt, &mut row.output)
     }
 

@@ -3,6 +3,7 @@
 //! Each frame is evolved from the population of the one before. Populations are kept, so the same command goes on where an
 //! earlier one was ended, and a shot can be made alone: its frames depend on nothing before it.
 
+mod extract;
 mod film;
 mod frame;
 mod input;
@@ -52,11 +53,12 @@ pub(super) fn make(args: &VideoArgs) -> ExitCode {
 }
 
 fn print_shots(options: &VideoOptions, is_json: bool) -> Result<()> {
+    let interrupt = Interrupt::listen()?;
     options.pictures.computing.start_threads()?;
     let folder = tempfile::tempdir()
         .map_err(|error| Error::Internal(format!("there is no place for temporary files ({error})")))?;
-    let frames = input::find(&options.inputs, folder.path())?;
-    plan::print_shots(&plan::plan(options, &frames.paths)?, is_json)
+    let frames = input::find(options, &folder.path().join("input"), &interrupt)?;
+    plan::print_shots(&plan::plan(options, &frames.paths, &interrupt)?, is_json)
 }
 
 /// As [`shoot_all`], and writes the trace if one was asked for.
@@ -75,14 +77,14 @@ fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> R
     options.pictures.computing.start_threads()?;
     animation::check_writable(&options.films)?;
     let store = Store::new(options);
-    let frames = input::find(&options.inputs, &options.populations.join("input"))?;
+    let frames = input::find(options, &options.populations.join("input"), &interrupt)?;
     check_places(options, &frames.paths)?;
     let selected = options.pictures.computing.select()?;
     inside::trace_device(&options.pictures.tracer, &selected);
     if options.pictures.verbosity > Verbosity::Quiet {
         report::say_device(&selected);
     }
-    let planned = plan::plan(options, &frames.paths)?;
+    let planned = plan::plan(options, &frames.paths, &interrupt)?;
     store.check(&planned)?;
     film::check_replaceable(options, &planned, frames.frames_per_s)?;
     store.create()?;

@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::options::{Leash, Limit, VideoOptions, WarmStart};
+use crate::app::interrupt::Interrupt;
 use crate::app::options::{EvolveOptions, SchemeOptions};
 use crate::app::picture::SchemeName;
 use crate::app::prepared::Prepared;
@@ -73,14 +74,16 @@ pub(super) fn frame_options(options: &VideoOptions, input: &Path) -> EvolveOptio
 /// Reads all frames that were asked for, and decides how each begins.
 ///
 /// # Errors
-/// [`Error::Input`] for a frame that cannot be used, [`Error::Usage`] if there are none of those asked for.
-pub(super) fn plan(options: &VideoOptions, paths: &[PathBuf]) -> Result<Vec<Planned>> {
+/// [`Error::Input`] for a frame that cannot be used, [`Error::Usage`] if there are none of those asked for;
+/// [`Error::Interrupted`].
+pub(super) fn plan(options: &VideoOptions, paths: &[PathBuf], interrupt: &Interrupt) -> Result<Vec<Planned>> {
     let span = options.span.map_or(0..paths.len(), |span| span.first..span.end);
     if span.end > paths.len() {
         let sentence = format!("--frames {}..{}: there are {} frames", span.start, span.end, paths.len());
         return Err(Error::Usage(sentence));
     }
-    let seen: Vec<Seen> = paths[span.clone()].par_iter().map(|path| see(options, path)).collect::<Result<_>>()?;
+    let see = |path: &PathBuf| interrupt.check().and_then(|()| see(options, path));
+    let seen: Vec<Seen> = paths[span.clone()].par_iter().map(see).collect::<Result<_>>()?;
     let mut planned: Vec<Planned> = Vec::new();
     for (index, one) in seen.iter().enumerate() {
         let number = span.start + index;

@@ -1,12 +1,13 @@
 //! The files of the frames: whether each is there and whole, or may be written.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::options::VideoOptions;
 use super::plan::Planned;
 use crate::app::destination::{self, Destination};
 use crate::app::options::Overwrite;
+use crate::app::outputs::{self, EncodedFile};
 use crate::app::provenance;
 use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
@@ -14,6 +15,9 @@ use crate::photo;
 
 /// Digits of the number in a name.
 const DIGITS: usize = 6;
+
+/// What is said of a file that may be somebody's own.
+const FOREIGN: &str = "not made by smalti";
 
 /// Where the files of the frames are.
 #[derive(Clone, Debug)]
@@ -91,16 +95,33 @@ impl Store {
                 let why = match provenance::story_of_file(&destination) {
                     Some(story) if story.is_of(key) => continue,
                     Some(_) => "made with other options",
-                    // What was cut short, perhaps when the machine went down, is nothing to keep.
-                    None if !path.is_file() || !destination.is_picture() || !photo::is_whole(path) => continue,
-                    None => "not made by smalti",
+                    None if !path.is_file() => continue,
+                    // What may be ours is compared with what is to be written, once that is known.
+                    None if destination.is_picture() && !photo::is_whole(path) => continue,
+                    None if !destination.is_picture() && archive::is_cut_short(path) => continue,
+                    None => FOREIGN,
                 };
-                let path = path.display();
-                return Err(Error::Usage(format!(
-                    "{path} exists and was {why}; name another folder, or replace it with --force"
-                )));
+                return Err(kept(path, why));
             }
         }
         Ok(())
     }
+
+    /// Refuses to replace a file that does not tell that smalti made it, unless it is what is left of these bytes.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names the file.
+    pub(super) fn check_remade(&self, file: &EncodedFile<'_>) -> Result<()> {
+        let path = &file.destination.path;
+        let may_go = self.overwrite == Overwrite::Force
+            || !path.is_file()
+            || provenance::told_by_file(file.destination).is_some()
+            || outputs::is_left_of(path, &file.bytes);
+        if may_go { Ok(()) } else { Err(kept(path, FOREIGN)) }
+    }
+}
+
+fn kept(path: &Path, why: &str) -> Error {
+    let path = path.display();
+    Error::Usage(format!("{path} exists and was {why}; name another folder, or replace it with --force"))
 }

@@ -3,14 +3,17 @@
 //! The bytes go to a temporary file beside the target, which then takes the target's name. Nothing here knows what the
 //! bytes mean, or whether the user agreed to replace what is there.
 
+mod journal;
+
 use std::fs::{self, DirEntry, File, Metadata, TryLockError};
-use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf, is_separator};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use tempfile::NamedTempFile;
+use tempfile::{Builder, NamedTempFile, TempDir};
 
+pub use self::journal::Journal;
 use crate::error::{Error, Result};
 
 /// How the names of temporary files begin and end.
@@ -20,6 +23,8 @@ const SUFFIX: &str = ".partial";
 const HOST_END: char = '@';
 /// Temporary files of other hosts, whose locks may not reach here, are left behind if nobody wrote to them for so long.
 const LEFT_AFTER: Duration = Duration::from_secs(24 * 3600);
+/// The file in a temporary folder that its process holds locked.
+const LOCK: &str = ".lock";
 
 /// Writes `bytes` to `path`, replacing what is there in one step.
 ///
@@ -119,58 +124,55 @@ impl PartialFile {
     }
 }
 
-/// A file of lines that grows line by line, each written whole, by one process or by several.
+/// A folder that fills up beside its target, and takes its name only when it is whole. Dropped before that, it goes away.
 #[derive(Debug)]
-pub struct Journal {
-    path: PathBuf,
-    file: File,
+pub struct PartialFolder {
+    folder: TempDir,
+    lock: File,
 }
 
-impl Journal {
-    /// The journal at `path`, begun if there is none.
+impl PartialFolder {
+    /// An empty folder in `parent`, which is there.
     ///
     /// # Errors
-    /// [`Error::Output`] if it cannot be written to.
-    pub fn open(path: &Path) -> Result<Self> {
-        let file = File::options().read(true).append(true).create(true).open(path);
-        Ok(Self { path: path.to_owned(), file: file.map_err(|error| output_error(path, &error))? })
+    /// [`Error::Output`] if `parent` cannot be written to.
+    pub fn create_in(parent: &Path) -> Result<Self> {
+        let create = || loop {
+            let folder = names(0o777).tempdir_in(parent)?;
+            match File::create_new(folder.path().join(LOCK)) {
+                Ok(lock) if is_held(&lock, &folder.path().join(LOCK)) => return Ok(Self { folder, lock }),
+                // Whoever sweeps found it before it was locked.
+                Ok(_) => {}
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+            }
+        };
+        create().map_err(|error| output_error(parent, &error))
     }
 
-    /// Adds a line, which has no end of its own. A line that a killed process left unfinished is ended first.
+    /// Where the folder is while it fills up.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Gives the folder the name `target`, in one step; gives it back if something is there that is no empty folder.
     ///
     /// # Errors
-    /// [`Error::Output`] if the disk is full or the file went away.
-    pub fn append(&mut self, line: &str) -> Result<()> {
-        // Where the file system has no locks, short writes at the end do not mix either.
-        let is_locked = self.file.lock().is_ok();
-        let length = self.file.metadata().ok().filter(Metadata::is_file).map(|found| found.len());
-        let done = self.append_whole(line);
-        if is_locked {
-            // A half line tells nothing. If it cannot be taken away, the next line ends it. Without the lock, it might be
-            // another process's line that would be cut.
-            if let (Err(_), Some(length)) = (&done, length) {
-                let _ = self.file.set_len(length);
+    /// [`Error::Output`] if it cannot be renamed.
+    pub fn commit(self, target: &Path) -> Result<Option<Self>> {
+        use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty, NotADirectory};
+        match fs::rename(self.path(), target) {
+            Ok(()) => {
+                // Not before: without its lock, it would be swept.
+                drop(self.lock);
+                let _ = self.folder.keep();
+                let _ = fs::remove_file(target.join(LOCK));
+                Ok(None)
             }
-            let _ = self.file.unlock();
+            Err(error) if matches!(error.kind(), AlreadyExists | DirectoryNotEmpty | NotADirectory) => Ok(Some(self)),
+            Err(error) => Err(output_error(target, &error)),
         }
-        done.map_err(|error| output_error(&self.path, &error))
-    }
-
-    fn append_whole(&mut self, line: &str) -> io::Result<()> {
-        let mut bytes = format!("{line}\n").into_bytes();
-        if !self.file.metadata()?.is_file() {
-            return self.file.write_all(&bytes);
-        }
-        let length = self.file.seek(SeekFrom::End(0))?;
-        if length > 0 {
-            self.file.seek(SeekFrom::End(-1))?;
-            let mut last = [0];
-            self.file.read_exact(&mut last)?;
-            if last != *b"\n" {
-                bytes.insert(0, b'\n');
-            }
-        }
-        self.file.write_all(&bytes)
     }
 }
 
@@ -239,62 +241,65 @@ fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
 }
 
 fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    let prefix = format!("{}{}-", own_prefix(), std::process::id());
-    builder.prefix(&prefix).suffix(SUFFIX);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // The umask takes its bits away, as for any file that a program creates.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
     loop {
-        let file = builder.tempfile_in(folder)?;
-        // Whoever sweeps may have found it before it was locked, and then it is about to go.
-        let is_ours = match file.as_file().try_lock() {
-            Ok(()) => true,
-            Err(TryLockError::WouldBlock) => false,
-            // Some file systems have no locks; there nothing is swept.
-            Err(TryLockError::Error(_)) => true,
-        };
-        if is_ours && file.path().exists() {
+        let file = names(0o666).tempfile_in(folder)?;
+        if is_held(file.as_file(), file.path()) {
             return Ok(file);
         }
     }
 }
 
 /// How the names of this host's temporary files begin.
-fn own_prefix() -> String {
-    static HOST: OnceLock<String> = OnceLock::new();
-    let host = HOST.get_or_init(|| {
+fn own_prefix() -> &'static str {
+    static OWN: OnceLock<String> = OnceLock::new();
+    OWN.get_or_init(|| {
         let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         let plain = |char: char| if char.is_ascii_alphanumeric() || char == '.' { char } else { '-' };
-        name.trim().chars().map(plain).take(64).collect()
-    });
-    format!("{PREFIX}{host}{HOST_END}")
+        let host: String = name.trim().chars().map(plain).take(64).collect();
+        format!("{PREFIX}{host}{HOST_END}")
+    })
 }
 
-/// Removes the temporary files that processes of this host left in `folder` when they were killed, and those of other hosts to
-/// which nobody wrote for a day by `age_of`. Those of living processes are locked, and stay, and so do those that belong to
-/// somebody else.
+/// How temporary files and folders are named, and what may be done with them, less what the umask takes away.
+fn names(mode: u32) -> Builder<'static, 'static> {
+    let mut builder = Builder::new();
+    builder.prefix(own_prefix()).suffix(SUFFIX);
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
+    #[cfg(not(unix))]
+    let _ = mode;
+    builder
+}
+
+/// Locks a file that was just made; false if whoever sweeps found it before, and then it is about to go.
+fn is_held(file: &File, path: &Path) -> bool {
+    // Some file systems have no locks; there nothing is swept.
+    !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) && path.exists()
+}
+
+/// Removes the temporary files and folders that processes of this host left in `folder` when they were killed, and those of other
+/// hosts to which nobody wrote for a day by `age_of`. Those of living processes are locked, and stay, and so do those that belong
+/// to somebody else.
 ///
 /// # Errors
 /// [`Error::Output`] if the folder cannot be read, or such a file cannot be removed.
 pub fn sweep(folder: &Path, age_of: impl Fn(&Metadata) -> Option<Duration>) -> Result<()> {
-    let own_prefix = own_prefix();
-    let is_left = |entry: &DirEntry| entry.metadata().ok().and_then(|found| age_of(&found)) > Some(LEFT_AFTER);
+    let is_old = |entry: &DirEntry| entry.metadata().ok().and_then(|found| age_of(&found)) > Some(LEFT_AFTER);
     let sweep = || -> io::Result<()> {
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
             let name = entry.file_name();
             let name = name.as_encoded_bytes();
             let is_named_so = name.starts_with(PREFIX.as_bytes()) && name.ends_with(SUFFIX.as_bytes());
+            if !is_named_so || !(name.starts_with(own_prefix().as_bytes()) || is_old(&entry)) {
+                continue;
+            }
+            let kind = entry.file_type()?;
+            if kind.is_dir() {
+                pass_over_others(remove_folder_unless_in_use(&entry.path()))?;
             // To open a pipe would wait for its writer.
-            if is_named_so
-                && entry.file_type()?.is_file()
-                && (name.starts_with(own_prefix.as_bytes()) || is_left(&entry))
-            {
-                remove_unless_in_use(&entry.path())?;
+            } else if kind.is_file() {
+                pass_over_others(remove_unless_in_use(&entry.path()))?;
             }
         }
         Ok(())
@@ -303,12 +308,33 @@ pub fn sweep(folder: &Path, age_of: impl Fn(&Metadata) -> Option<Duration>) -> R
 }
 
 fn remove_unless_in_use(path: &Path) -> io::Result<()> {
-    let remove = || -> io::Result<()> {
-        // For an exclusive lock, NFS wants a file that may be written to.
-        let file = File::options().read(true).write(true).open(path)?;
-        if file.try_lock().is_ok() { fs::remove_file(path) } else { Ok(()) }
+    // For an exclusive lock, NFS wants a file that may be written to.
+    let file = File::options().read(true).write(true).open(path)?;
+    if file.try_lock().is_ok() { fs::remove_file(path) } else { Ok(()) }
+}
+
+fn remove_folder_unless_in_use(path: &Path) -> io::Result<()> {
+    let lock = match File::options().read(true).write(true).open(path.join(LOCK)) {
+        Ok(lock) => lock,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            // Its process has not come to lock it, and never will if it was killed. What is in use is not empty.
+            let _ = fs::remove_dir(path);
+            return Ok(());
+        }
+        Err(error) => return Err(error),
     };
-    remove().or_else(|error| match error.kind() {
+    if lock.try_lock().is_err() {
+        return Ok(());
+    }
+    match fs::remove_dir_all(path) {
+        // A child of the killed process still writes into it. The next time it may be over.
+        Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => File::create(path.join(LOCK)).map(drop),
+        removed => removed,
+    }
+}
+
+fn pass_over_others(removed: io::Result<()>) -> io::Result<()> {
+    removed.or_else(|error| match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied => Ok(()),
         _ => Err(error),
     })
@@ -359,19 +385,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_follows_one_that_was_never_ended_on_a_line_of_its_own() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let path = folder.path().join("rows.jsonl");
-        let (mut one, mut other) = (Journal::open(&path), Journal::open(&path));
-        for (journal, line) in [(&mut one, "a"), (&mut other, "b")] {
-            journal.as_mut().expect("the folder is ours").append(line).expect("there is room");
-        }
-        fs::write(&path, b"a\nb\n{\"half").expect("the folder is ours");
-        other.expect("the folder is ours").append("c").expect("there is room");
-        assert_eq!(fs::read_to_string(&path).expect("it is there"), "a\nb\n{\"half\nc\n");
-    }
-
-    #[test]
     fn what_a_killed_process_left_is_swept_and_what_a_living_one_writes_is_not() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let left = folder.path().join(format!("{}1-abc{SUFFIX}", own_prefix()));
@@ -381,7 +394,14 @@ mod tests {
             fs::write(path, b"half").expect("the folder is ours");
         }
         let growing = PartialFile::create(&folder.path().join("out.png")).expect("the folder is ours");
+        let left_folder = folder.path().join(format!("{}def.partial", own_prefix()));
+        let fill =
+            |()| fs::write(left_folder.join(LOCK), b"").and_then(|()| fs::write(left_folder.join("1.png"), b"half"));
+        fs::create_dir(&left_folder).and_then(fill).expect("the folder is ours");
+        let filling = PartialFolder::create_in(folder.path()).expect("the folder is ours");
         sweep(folder.path(), |_| Some(Duration::ZERO)).expect("the folder is ours");
+        assert!(!left_folder.exists() && filling.path().exists());
+        assert!(filling.commit(&folder.path().join("frames")).expect("nothing is there").is_none());
         assert!(!left.exists() && other.exists() && of_host.exists() && growing.growing_path().exists());
         sweep(folder.path(), |_| Some(2 * LEFT_AFTER)).expect("the folder is ours");
         assert!(other.exists() && !of_host.exists() && growing.growing_path().exists());
