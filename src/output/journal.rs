@@ -18,7 +18,7 @@ impl Journal {
     /// The journal at `path`, begun if there is none.
     ///
     /// # Errors
-    /// [`Error::Output`] if it cannot be written to.
+    /// [`crate::Error::Output`] if it cannot be written to.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::options().read(true).append(true).create(true).open(path);
         Ok(Self { path: path.to_owned(), file: file.map_err(|error| output_error(path, &error))? })
@@ -27,7 +27,7 @@ impl Journal {
     /// Adds a line, which has no end of its own. A line that a killed process left unfinished is ended first.
     ///
     /// # Errors
-    /// [`Error::Output`] if the disk is full or the file went away.
+    /// [`crate::Error::Output`] if the disk is full or the file went away.
     pub fn append(&mut self, line: &str) -> Result<()> {
         // Where the file system has no locks, short writes at the end do not mix either.
         let is_locked = self.file.lock().is_ok();
