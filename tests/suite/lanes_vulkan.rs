@@ -147,8 +147,8 @@ fn lanes_wait_while_the_device_is_full_and_refuse_what_it_can_never_hold() {
     canary::with_device(&DeviceOptions::default(), |device| {
         assert_eq!(device.info().limits.storage_buffer_bytes, 128 << 20, "the sizes here are for this limit");
         let mut lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
-        // Lanes that are cut otherwise have buffers of their own.
-        let shape = narrow(&device);
+        // Lanes that are cut otherwise have buffers of their own; so wide, the steps of all are short enough for any subgroup.
+        let shape = CellShape { lanes: 64, form: CellForm::Wide, ..narrow(&device) };
         let try_admit = |lanes: &mut VulkanLanes, course: &Course| lanes.admit_with_shape(course.clone(), None, shape);
         let first = try_admit(&mut lanes, &small(96)).expect("it fits").expect("there is room");
         lanes.ask(first, 2).expect("the device works");
