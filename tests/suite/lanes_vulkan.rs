@@ -291,7 +291,9 @@ fn the_stages_of_a_timed_submission_have_the_stems_of_their_shaders() {
         lanes.dismiss(taken[0]);
         lanes.ask(taken[1], 1).expect("the device works");
         lanes.work().expect("the device works");
-        let last: Vec<&str> = lanes.pass_times().iter().map(|time| time.name).collect();
+        let names = lanes.pass_times().iter().map(|time| time.name);
+        // Through staging buffers there are copies, too.
+        let last: Vec<&str> = names.filter(|name| !["uploads", "read-backs"].contains(name)).collect();
         let stems = ["cells_depths", "cells_deal", "cells_scan", "cells_scatter", "cells_sort", "cells_glazed"];
         assert_eq!(last[..6], stems);
         assert_eq!(last[6..8], ["cells_fitness", "cells_fitness"]);
