@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use serde::Serialize;
 
-use super::score::{EXIT_SOME_FAILED, ScoreArgs, read};
+use super::score::{ScoreArgs, read, score_each};
 use super::{inputs, report};
 use crate::error::{Error, Result};
 use crate::metrics::{Difference, Flicker};
@@ -43,23 +43,7 @@ pub(super) fn score(args: &ScoreArgs) -> ExitCode {
 
 fn score_all(args: &ScoreArgs) -> Result<ExitCode> {
     let reference = inputs::in_folder(&args.reference)?;
-    let (mut rows, mut worst) = (Vec::new(), 0);
-    for folder in &args.pictures {
-        match score_one(args, &reference, folder) {
-            Ok(row) => rows.push(row),
-            Err(error) => {
-                report::error(&error.to_string());
-                worst = error.exit_code();
-            }
-        }
-    }
-    if args.json {
-        report::print_json(&rows)?;
-    } else if !rows.is_empty() {
-        report::write_stdout(table(&rows).as_bytes())?;
-    }
-    let some_failed = worst != 0 && !rows.is_empty();
-    Ok(ExitCode::from(if some_failed { EXIT_SOME_FAILED } else { worst }))
+    score_each(args, |folder| score_one(args, &reference, folder), table)
 }
 
 fn score_one(args: &ScoreArgs, reference: &[PathBuf], folder: &Path) -> Result<Row> {

@@ -13,7 +13,7 @@ use crate::model::Rgb;
 use crate::photo::{self, Background, Photo, ReadOptions};
 
 /// Exit code when some of the pictures could not be scored.
-pub(super) const EXIT_SOME_FAILED: u8 = 3;
+const EXIT_SOME_FAILED: u8 = 3;
 
 const AFTER_HELP: &str = "\
 Columns (more in --json: MAE_R, MAE_G, MAE_B, EDGE_P, EDGE_R, width, height):
@@ -138,10 +138,19 @@ pub(super) fn score(args: &ScoreArgs) -> ExitCode {
 fn score_all(args: &ScoreArgs) -> Result<ExitCode> {
     let photo = read(&args.reference, args.background)?;
     let reference = Reference::new(picture(&photo)).map_err(|reason| Error::input(&args.reference, reason))?;
-    let mut rows = Vec::new();
-    let mut worst = 0;
+    score_each(args, |path| score_one(&reference, path, args.background), table)
+}
+
+/// Scores all that `args` names against the reference, and prints the rows as JSON or as the table that they make; what fails is
+/// told, and the others go on.
+pub(super) fn score_each<R: Serialize>(
+    args: &ScoreArgs,
+    score_one: impl Fn(&Path) -> Result<R>,
+    table: impl FnOnce(&[R]) -> String,
+) -> Result<ExitCode> {
+    let (mut rows, mut worst) = (Vec::new(), 0);
     for path in &args.pictures {
-        match score_one(&reference, path, args.background) {
+        match score_one(path) {
             Ok(row) => rows.push(row),
             Err(error) => {
                 report::error(&error.to_string());

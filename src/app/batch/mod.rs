@@ -105,7 +105,8 @@ pub(super) struct BatchArgs {
     #[command(flatten)]
     pub picture: PictureArgs,
 
-    /// Pictures that evolve at the same time on a device [default: a CPU thread each, or as many as the GPU's memory holds]
+    /// Pictures that evolve at the same time on a device [default: one for each CPU thread; 256 on a GPU, 16 on software
+    /// Vulkan, or as many as its memory holds]
     #[arg(long, value_name = "N", value_parser = values::count, help_heading = "Computing")]
     pub in_flight: Option<u64>,
     /// Threads that read pictures ahead, and that save them [default: half the CPU threads each]

@@ -8,6 +8,7 @@ use crate::app::computing::Computing;
 use crate::app::device::Selected;
 use crate::app::options::in_range;
 use crate::error::{Error, Result};
+use crate::vk::DeviceKind;
 
 /// Most threads that read, or save.
 const IO_THREADS_MAX: usize = 64;
@@ -15,8 +16,10 @@ const IO_THREADS_MAX: usize = 64;
 const IO_THREADS_USUAL: usize = 8;
 /// Most pictures that evolve at the same time on a device.
 const IN_FLIGHT_MAX: u64 = 4_096;
-/// Most lanes of a Vulkan device unless somebody asks for more; its memory may hold fewer.
+/// Most lanes of a GPU unless somebody asks for more; its memory may hold fewer.
 const LANES_USUAL: usize = 256;
+/// The same of software Vulkan, where more lanes only crowd the caches (`cargo bench --bench paper_lanes`).
+const LANES_USUAL_IN_SOFTWARE: usize = 16;
 
 /// Threads that read, and threads that save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +57,10 @@ pub(super) fn workers(args: &BatchArgs, computing: &Computing, item_count: usize
     let most = |usual: usize| in_flight.map_or(usual, |count| count as usize).min(share);
     let worker = |selected: Selected| {
         let in_flight = match selected {
-            Selected::Vulkan { .. } => InFlight::Lanes(most(LANES_USUAL)),
+            Selected::Vulkan { ref device, .. } => InFlight::Lanes(most(match device.info().kind {
+                DeviceKind::Cpu => LANES_USUAL_IN_SOFTWARE,
+                _ => LANES_USUAL,
+            })),
             Selected::Cpu { .. } => {
                 let count = most(threads);
                 InFlight::Pools((0..count).map(|_| pool((threads / count).max(1))).collect::<Result<_>>()?)
