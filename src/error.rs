@@ -1,59 +1,92 @@
-//! What can go wrong, one sentence each: what happened, to which file or device, and what to do about it.
+//! What can go wrong. An [`Error`] says what happened, and to which file, parameter or device. Its fields are for
+//! callers that want to react to it.
 //!
-//! Every message is written for the person at the terminal. [`Error::exit_code`] is the documented exit code of the
-//! command line (README, "Exit codes").
+//! Nothing here names a flag of the command line or an exit code. The command line adds the flags that help.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Result of everything in the crate that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// A failure, in the words that the user reads.
+/// A failure. It is displayed as one sentence, without a full stop.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// An option or a combination of options makes no sense.
+    /// A parameter is outside its range, or does not fit the others.
+    #[error("{name}: {reason}")]
+    Parameter {
+        /// The parameter, in snake_case: `grout_width`.
+        name: String,
+        /// What it may be, and what it was.
+        reason: String,
+    },
+    /// A name stands for none of the things that are built in.
+    #[error("there is no {what} `{name}`; there are {known}")]
+    UnknownName {
+        /// What was looked for, in the singular.
+        what: &'static str,
+        /// The name that was given.
+        name: String,
+        /// The names that there are, with commas.
+        known: String,
+    },
+    /// The command line makes no sense. Only the command line itself says this; the library never does.
     #[error("{0}")]
     Usage(String),
-    /// A file named on the command line cannot be used.
+    /// A file that is to be read cannot be used.
     #[error("{}: {reason}", path.display())]
     Input {
-        /// The file, as the user wrote it.
+        /// The file, as the caller named it.
         path: PathBuf,
         /// Why it cannot be used, and what to do.
         reason: String,
     },
-    /// An output cannot be written.
+    /// A file cannot be written.
     #[error("{}: {reason}", path.display())]
     Output {
-        /// The file, as the user wrote it.
+        /// The file, as the caller named it.
         path: PathBuf,
         /// Why it cannot be written, and what to do.
         reason: String,
     },
-    /// No device fits `--device`, or Vulkan itself is missing.
+    /// A file format cannot hold what is to be encoded.
+    #[error("the {what} cannot be written as {format}: {reason}")]
+    Encoding {
+        /// What was to be encoded: a picture or a population.
+        what: &'static str,
+        /// The format.
+        format: &'static str,
+        /// Why it cannot be written.
+        reason: String,
+    },
+    /// There is no device that can do the work.
     #[error("no suitable device: {why}")]
     NoSuitableDevice {
-        /// What was asked for, what was found, and what to install or to choose instead.
-        why: String,
+        /// What is missing.
+        why: NoDevice,
     },
-    /// The device stopped working in the middle of the work.
-    #[error("the Vulkan device was lost during `{last_pass}`; run the same command again, or use --device cpu")]
+    /// The device stopped working in the middle of the work. The same work may succeed if it is tried again.
+    #[error("the Vulkan device was lost during `{last_pass}`")]
     DeviceLost {
         /// Label of the last pass that was submitted.
         last_pass: String,
     },
     /// The device has no room for a buffer or an image.
-    #[error(
-        "the Vulkan device has no memory left for {name} ({bytes} bytes); use a smaller --size or fewer --tiles, or --device cpu"
-    )]
+    #[error("the Vulkan device has no memory left for {name} ({bytes} bytes)")]
     OutOfDeviceMemory {
         /// Debug name of the buffer or image.
         name: String,
         /// Bytes asked for.
         bytes: u64,
     },
-    /// A Vulkan call failed in a way that has no sentence of its own.
+    /// The driver ran out of memory while it worked, though every buffer and image had been created.
+    #[error("Vulkan: {call} failed: no memory is left")]
+    OutOfMemory {
+        /// The call that failed, with the pass that it was for.
+        call: String,
+    },
+    /// A Vulkan call failed in a way that has no variant of its own.
     #[error("Vulkan: {call} failed: {reason}")]
     Vulkan {
         /// The call that failed, with the name of the object it was for.
@@ -61,21 +94,111 @@ pub enum Error {
         /// The driver's result code or the loader's message.
         reason: String,
     },
-    /// A picture or population is larger than a limit.
-    #[error("{0}")]
-    TooLarge(String),
-    /// The validation layer complained (only with `--validate`).
+    /// The work is larger than a limit of the device, of the memory or of the engine.
+    #[error("{what}")]
+    TooLarge {
+        /// What is too large, and the limit.
+        what: String,
+        /// What would make it fit; each of these helps by itself.
+        remedies: &'static [Remedy],
+    },
+    /// The validation layer complained. It is only there if it was asked for.
     #[error("Vulkan validation: {0}")]
     Validation(String),
     /// Somebody asked for the end before the work was done.
-    #[error("interrupted; run the same command again")]
+    #[error("interrupted")]
     Interrupted,
     /// The engine contradicts itself: a bug.
-    #[error("internal error: {0}; please report it with the command that led to it")]
+    #[error("internal error: {0}; please report it")]
     Internal(String),
 }
 
+/// Why there is no device that can do the work.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoDevice {
+    /// The Vulkan loader is not installed, or cannot be opened.
+    #[error(
+        "the Vulkan loader cannot be opened ({reason}); install libvulkan1 and a driver such as mesa-vulkan-drivers"
+    )]
+    NoLoader {
+        /// What the dynamic linker said.
+        reason: String,
+    },
+    /// The Vulkan loader is older than Vulkan 1.3.
+    #[error("the Vulkan loader only knows Vulkan {major}.{minor} and 1.3 is needed; install a newer libvulkan1")]
+    OldLoader {
+        /// The first number of the loader's version.
+        major: u32,
+        /// The second number of the loader's version.
+        minor: u32,
+    },
+    /// No Vulkan driver is installed.
+    #[error("no Vulkan driver is installed; install mesa-vulkan-drivers or the driver of the GPU's vendor")]
+    NoDriver,
+    /// A driver is installed, and there is nothing that it could drive.
+    #[error(
+        "a Vulkan driver is installed but found no hardware that it drives; install mesa-vulkan-drivers for software Vulkan"
+    )]
+    NoHardware,
+    /// The validation layer was asked for and is not installed.
+    #[error("the validation layer VK_LAYER_KHRONOS_validation is not installed; install vulkan-validationlayers")]
+    NoValidationLayer,
+    /// The device that was asked for lacks something that the engine needs.
+    #[error("{device} lacks {}", missing.join(", "))]
+    Lacks {
+        /// The request that led to the device, if it was not chosen by itself.
+        request: Option<String>,
+        /// Name of the device.
+        device: String,
+        /// What it lacks.
+        missing: Vec<String>,
+    },
+    /// No device fits the request.
+    #[error("{}", unlisted(request, devices))]
+    Unlisted {
+        /// What was asked for.
+        request: String,
+        /// The devices that there are: number and name of each.
+        devices: Vec<String>,
+    },
+    /// The device went away after it was listed.
+    #[error("{device} is no longer there")]
+    Gone {
+        /// Name of the device.
+        device: String,
+    },
+    /// Another reason, in the words of whoever needed the device.
+    #[error("{0}")]
+    Other(String),
+}
+
+/// What makes work fit that is too large.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Remedy {
+    /// Evolve the picture at a smaller size.
+    SmallerPicture,
+    /// Draw the result at a smaller size.
+    SmallerOutput,
+    /// Use fewer tiles.
+    FewerTiles,
+    /// Use more tiles: each is smaller then.
+    MoreTiles,
+    /// Make fewer candidates for each birth.
+    FewerCandidates,
+    /// Evolve fewer pictures at once.
+    FewerPictures,
+    /// Compute on the CPU, which has no such limit.
+    Cpu,
+}
+
 impl Error {
+    /// An [`Error::Parameter`].
+    pub fn parameter(name: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Parameter { name: name.into(), reason: reason.into() }
+    }
+
     /// An [`Error::Input`] about `path`.
     pub fn input(path: &Path, reason: impl Into<String>) -> Self {
         Self::Input { path: path.to_owned(), reason: reason.into() }
@@ -86,19 +209,27 @@ impl Error {
         Self::Output { path: path.to_owned(), reason: reason.into() }
     }
 
-    /// The exit code of the command line: 1 failed; 2 usage, configuration or unreadable input; 4 no suitable device;
-    /// 75 device lost, run again.
-    #[must_use]
-    pub fn exit_code(&self) -> u8 {
-        match self {
-            Self::Usage(_) | Self::Input { .. } | Self::TooLarge(_) => 2,
-            Self::NoSuitableDevice { .. } => 4,
-            Self::DeviceLost { .. } | Self::Interrupted => 75,
-            Self::Output { .. }
-            | Self::OutOfDeviceMemory { .. }
-            | Self::Vulkan { .. }
-            | Self::Validation(_)
-            | Self::Internal(_) => 1,
-        }
+    /// An [`Error::Encoding`] of a picture.
+    pub(crate) fn picture_as(format: &'static str, reason: &dyn fmt::Display) -> Self {
+        Self::Encoding { what: "picture", format, reason: reason.to_string() }
+    }
+}
+
+fn unlisted(request: &str, devices: &[String]) -> String {
+    if devices.is_empty() {
+        return format!("`{request}` was asked for and Vulkan lists no device");
+    }
+    format!("`{request}` fits no device; there are {}", devices.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_can_cross_threads_and_be_boxed() {
+        fn is_error<T: std::error::Error + Send + Sync + 'static>() {}
+        is_error::<Error>();
+        is_error::<NoDevice>();
     }
 }

@@ -125,10 +125,9 @@ fn cut_out(over_black: &Mosaic, over_white: &Mosaic) -> Vec<[u8; 4]> {
 /// The OpenRaster file of `layers` and of `merged`, the whole picture as a PNG file with our metadata in it.
 ///
 /// # Errors
-/// [`Error::Usage`] if the zip file would be larger than its format allows.
+/// [`Error::Encoding`] if the zip file would be larger than its format allows.
 pub fn encode(layers: &Layers, merged: &[u8]) -> Result<Vec<u8>> {
-    write_members(layers, merged)
-        .map_err(|error| Error::Usage(format!("the picture cannot be written as OpenRaster: {error}")))
+    write_members(layers, merged).map_err(|error| Error::picture_as("OpenRaster", &error))
 }
 
 fn write_members(layers: &Layers, merged: &[u8]) -> zip::result::ZipResult<Vec<u8>> {

@@ -21,7 +21,7 @@ use super::render::RenderArgs;
 use super::score::ScoreArgs;
 use super::timelapse::TimelapseArgs;
 use super::video::VideoArgs;
-use super::{config, report, values};
+use super::{advice, config, report, values};
 use crate::error::{Error, Result};
 
 /// Evolves pictures into mosaics of thousands of tiles.
@@ -54,8 +54,8 @@ impl Cli {
         let mut definition = Self::command();
         definition.build();
         let typed = config::expand(std::env::args_os().collect(), &definition).map_err(|error| {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
+            report::error(&advice::sentence(&error));
+            ExitCode::from(advice::exit_code(&error))
         })?;
         Self::try_parse_from(&typed).map(|cli| Self { typed, ..cli }).map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {

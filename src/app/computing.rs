@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::device::{self, Selected};
 use super::{options, report, values};
-use crate::error::{Error, Result};
+use crate::error::{Error, NoDevice, Result};
 use crate::vk::{DeviceRequest, Validation};
 
 /// Most CPU threads.
@@ -129,8 +129,10 @@ fn request(text: &str) -> Result<DeviceRequest> {
         return Ok(DeviceRequest::Auto);
     }
     if text.bytes().all(|byte| byte.is_ascii_digit()) && text.parse::<usize>().is_err() {
-        let why = format!("--device {text}: no machine has as many; see smalti devices for the numbers, or use auto");
-        return Err(Error::NoSuitableDevice { why });
+        let why = format!(
+            "--device {text}: there is no device with this number; see smalti devices for the numbers, or use auto"
+        );
+        return Err(Error::NoSuitableDevice { why: NoDevice::Other(why) });
     }
     text.parse()
 }

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use super::advice::why_no_vulkan;
 use super::pipelines::{KeptPipelines, PipelineFile};
 use super::prepared::check_messages;
 use crate::cpu::CpuEvaluator;
 use crate::cpu::cells::CpuSearch;
 use crate::engine::{PaperCrew, SearchCrew};
-use crate::error::{Error, Result};
+use crate::error::{Error, NoDevice, Result};
 use crate::gpu::{GpuEvaluator, VulkanLanes, VulkanSearch};
 use crate::model::cells::{Course, Search};
 use crate::model::{Evaluator, Fly, Scene};
@@ -102,7 +103,7 @@ pub(super) fn select_all(validation: Validation) -> Result<Vec<Selected>> {
     if gpus.is_empty() {
         let why =
             "--devices all: there is no hardware GPU; see smalti devices, or leave it to --device auto".to_owned();
-        return Err(Error::NoSuitableDevice { why });
+        return Err(Error::NoSuitableDevice { why: NoDevice::Other(why) });
     }
     let open = |info: &&DeviceInfo| {
         let (device, _kept) = open_device(&instance, info)?;
@@ -127,7 +128,7 @@ fn find_and_open(request: &DeviceRequest, validation: Validation, is_asked_for: 
     let index = match choose(request, &devices)? {
         Choice::Cpu { reason } if validation == Validation::On => {
             let why = format!("--validate needs a Vulkan device, and {reason}; name one, such as --device vulkan");
-            return Err(Error::NoSuitableDevice { why });
+            return Err(Error::NoSuitableDevice { why: NoDevice::Other(why) });
         }
         Choice::Cpu { reason } => return Ok(Selected::Cpu { reason: Some(reason) }),
         Choice::Vulkan(index) => index,
@@ -143,14 +144,6 @@ fn unless_nobody_asked(found: Result<Selected>, is_asked_for: bool) -> Result<Se
     match found {
         Err(error) if !is_asked_for => Ok(Selected::Cpu { reason: Some(why_no_vulkan(&error)) }),
         found => found,
-    }
-}
-
-/// Why the CPU twin stands in for Vulkan, to follow the word "since".
-pub(super) fn why_no_vulkan(error: &Error) -> String {
-    match error {
-        Error::NoSuitableDevice { why } => why.clone(),
-        other => other.to_string(),
     }
 }
 
@@ -261,7 +254,7 @@ mod tests {
     fn a_vulkan_that_fails_is_an_error_only_for_those_who_asked_for_it() {
         let failures = || {
             let broken = Error::Vulkan { call: "vkCreateInstance".to_owned(), reason: "ended".to_owned() };
-            [broken, Error::NoSuitableDevice { why: "vkCreateInstance ended".to_owned() }]
+            [broken, Error::NoSuitableDevice { why: NoDevice::Other("vkCreateInstance ended".to_owned()) }]
         };
         for error in failures() {
             match unless_nobody_asked(Err(error), false) {

@@ -6,7 +6,7 @@ use indicatif::{BinaryBytes, HumanCount};
 use serde_json::json;
 
 use super::cli::DevicesArgs;
-use super::{device, report};
+use super::{advice, report};
 use crate::error::Result;
 use crate::vk::{Choice, DeviceInfo, DeviceKind, DeviceLimits, DeviceRequest, Instance, InstanceOptions, choose};
 
@@ -23,7 +23,7 @@ fn print_list(args: &DevicesArgs) -> Result<()> {
             (devices, automatic)
         }
         // No device is an answer, since there is always the CPU twin.
-        Err(error) => (Vec::new(), Choice::Cpu { reason: device::why_no_vulkan(&error) }),
+        Err(error) => (Vec::new(), Choice::Cpu { reason: advice::why_no_vulkan(&error) }),
     };
     if args.json {
         let automatic = match &automatic {

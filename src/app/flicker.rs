@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use serde::Serialize;
 
 use super::score::{ScoreArgs, read, score_each};
-use super::{inputs, report};
+use super::{advice, inputs, report};
 use crate::error::{Error, Result};
 use crate::metrics::{Difference, Flicker};
 use crate::photo::Photo;
@@ -35,8 +35,8 @@ pub(super) fn score(args: &ScoreArgs) -> ExitCode {
     match score_all(args) {
         Ok(exit_code) => exit_code,
         Err(error) => {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
+            report::error(&advice::sentence(&error));
+            ExitCode::from(advice::exit_code(&error))
         }
     }
 }

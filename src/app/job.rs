@@ -304,6 +304,7 @@ pub(super) mod tests {
     use tempfile::TempDir;
 
     use super::*;
+    use crate::app::advice;
     use crate::app::cli::{Cli, Command};
 
     /// A folder with `cut.png`, whose left column is opaque and in two colours, `clear.png` without an opaque pixel, and
@@ -361,7 +362,7 @@ pub(super) mod tests {
         let (_folder, path) = folder();
         let clear = path("clear.png");
         let refusal = Picture::read(&clear, &KEPT, &Colors::Full, None).expect_err("no tile is wanted anywhere");
-        assert_eq!(refusal.exit_code(), 2);
+        assert_eq!(advice::exit_code(&refusal), 2);
         assert!(refusal.to_string().contains("clear.png: is transparent everywhere"), "{refusal}");
         Picture::read(&clear, &ReadOptions::default(), &Colors::Full, None).expect("it shows on black");
     }
@@ -375,7 +376,7 @@ pub(super) mod tests {
         for (map, reason) in [("square.png", "a map of 40x40 px does not fit"), ("none.png", "there is no such file")] {
             let refusal =
                 Picture::read(&photo, &KEPT, &Colors::Full, Some(&path(map))).expect_err("it is no map of it");
-            assert_eq!(refusal.exit_code(), 2);
+            assert_eq!(advice::exit_code(&refusal), 2);
             assert!(refusal.to_string().contains(&format!("{map}: {reason}")), "{refusal}");
         }
     }

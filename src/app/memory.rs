@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::model::{Backdrop, Blend, Canvas, Population, Tile};
 
 // The first two are about twice what the CPU twin takes for a random population of 50,000 flies at 4096x4096, and of
@@ -77,11 +77,14 @@ pub(super) fn check(needed_bytes: u64) -> Result<()> {
 
 fn check_against(needed_bytes: u64, available_bytes: Option<u64>) -> Result<()> {
     match available_bytes {
-        Some(available_bytes) if needed_bytes > available_bytes => Err(Error::TooLarge(format!(
-            "this needs about {} MiB of memory and {} MiB are free; use a smaller --size or --output-size, or fewer --tiles",
-            needed_bytes >> 20,
-            available_bytes >> 20
-        ))),
+        Some(available_bytes) if needed_bytes > available_bytes => Err(Error::TooLarge {
+            what: format!(
+                "this needs about {} MiB of memory and {} MiB are free",
+                needed_bytes >> 20,
+                available_bytes >> 20
+            ),
+            remedies: &[Remedy::SmallerPicture, Remedy::SmallerOutput, Remedy::FewerTiles],
+        }),
         _ => Ok(()),
     }
 }

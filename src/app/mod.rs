@@ -3,6 +3,7 @@
 //! Only this module prints, reads the clock, the environment, or paths given by the user. Failures end as one sentence
 //! on stderr; stdout carries data only.
 
+mod advice;
 mod batch;
 mod bench;
 mod cells;

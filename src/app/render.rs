@@ -19,7 +19,7 @@ use super::options::{self, Overwrite, Verbosity};
 use super::outputs::{self, Drawn, SUPERSAMPLING_MAX, Told, View};
 use super::provenance::{self, Provenance};
 use super::report::{self, Status};
-use super::{memory, prepared, values};
+use super::{advice, memory, prepared, values};
 use crate::archive::{self, Archive};
 use crate::error::{Error, Result};
 use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
@@ -194,14 +194,14 @@ pub(super) fn render(args: &RenderArgs) -> ExitCode {
     };
     let done = RenderOptions::new(args).and_then(|options| render_population(&options, &mut row));
     if let Err(error) = &done {
-        row.error = Some(error.to_string());
-        report::error(&error.to_string());
+        row.error = Some(advice::sentence(error));
+        report::error(&advice::sentence(error));
     }
     let printed = if args.json { report::print_json(&row) } else { Ok(()) };
     if let Err(error) = &printed {
-        report::error(&error.to_string());
+        report::error(&advice::sentence(error));
     }
-    done.and(printed).map_or_else(|error| ExitCode::from(error.exit_code()), |()| ExitCode::SUCCESS)
+    done.and(printed).map_or_else(|error| ExitCode::from(advice::exit_code(&error)), |()| ExitCode::SUCCESS)
 }
 
 /// The work, in order: check, read, draw, encode and write.

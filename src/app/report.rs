@@ -15,7 +15,7 @@ use super::job::Job;
 use super::options::{EvolveOptions, SchemeOptions, Verbosity};
 use super::picture::SchemeName;
 use super::provenance::Ending;
-use super::scheme;
+use super::{advice, scheme};
 use crate::error::{Error, Result};
 use crate::evolve::Evolution;
 use crate::model::Fly;
@@ -166,7 +166,7 @@ impl Row {
     /// Takes in why there is no result, or not all of it.
     pub(super) fn note_failure(&mut self, error: &Error) {
         self.status = Status::Failed;
-        self.error = Some(error.to_string());
+        self.error = Some(advice::sentence(error));
     }
 
     /// Prints the row to stdout.
@@ -356,8 +356,8 @@ pub(super) fn exit_code(done: Result<()>) -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            error(&failure.to_string());
-            ExitCode::from(failure.exit_code())
+            error(&advice::sentence(&failure));
+            ExitCode::from(advice::exit_code(&failure))
         }
     }
 }

@@ -18,7 +18,7 @@ use super::recorder::Recorder;
 use super::report::{self, Row, Status};
 use super::result::Evolved;
 use super::watch::Watchers;
-use super::{curve_file, destination, outputs, provenance, result};
+use super::{advice, curve_file, destination, outputs, provenance, result};
 use crate::error::Result;
 
 /// Evolves one picture and reports about it; the exit code of the process.
@@ -27,15 +27,15 @@ pub(super) fn evolve(args: &EvolveArgs) -> ExitCode {
     let done = EvolveOptions::new(args).and_then(|options| evolve_watched(options, &args.inside, &mut row));
     if let Err(error) = &done {
         row.note_failure(error);
-        report::error(&error.to_string());
+        report::error(&advice::sentence(error));
     }
     let printed = if args.json { row.print() } else { Ok(()) };
     if let Err(error) = &printed {
-        report::error(&error.to_string());
+        report::error(&advice::sentence(error));
     }
     match done.and(printed) {
         Ok(()) => ExitCode::from(row.exit_code()),
-        Err(error) => ExitCode::from(error.exit_code()),
+        Err(error) => ExitCode::from(advice::exit_code(&error)),
     }
 }
 

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use serde::Serialize;
 
-use super::{flicker, report, values};
+use super::{advice, flicker, report, values};
 use crate::error::{Error, Result};
 use crate::metrics::{Picture, Reference, Score};
 use crate::model::Rgb;
@@ -129,8 +129,8 @@ pub(super) fn score(args: &ScoreArgs) -> ExitCode {
     match score_all(args) {
         Ok(exit_code) => exit_code,
         Err(error) => {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
+            report::error(&advice::sentence(&error));
+            ExitCode::from(advice::exit_code(&error))
         }
     }
 }
@@ -153,8 +153,8 @@ pub(super) fn score_each<R: Serialize>(
         match score_one(path) {
             Ok(row) => rows.push(row),
             Err(error) => {
-                report::error(&error.to_string());
-                worst = error.exit_code();
+                report::error(&advice::sentence(&error));
+                worst = advice::exit_code(&error);
             }
         }
     }

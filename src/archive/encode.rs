@@ -30,17 +30,18 @@ enum Thrift {
 /// The population with the marginal fitness of each fly as a `.npz` file; `meta` goes into its `meta.json`.
 ///
 /// # Errors
-/// [`Error::Usage`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the file
-/// (`schema`, `width_px`, `height_px`, `background`, `transparent`, `blend`, `grout`), or if there are more than
-/// [`FLY_COUNT_MAX`] flies.
+/// [`Error::Parameter`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the
+/// file (`schema`, `width_px`, `height_px`, `background`, `transparent`, `blend`, `grout`), or if there are more than
+/// [`FLY_COUNT_MAX`] flies; [`Error::Encoding`] if the file would be larger than its format allows.
 pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
     let fly_count = population.flies.len();
     if fly_count != fitness.len() || fly_count > FLY_COUNT_MAX {
-        return Err(Error::Usage(format!(
-            "a population of {fly_count} flies with {} values of fitness cannot be written: each fly needs one, and \
-             there may be at most {FLY_COUNT_MAX}",
+        let reason = format!(
+            "{fly_count} flies with {} values of fitness cannot be written: each fly needs one, and there may be at most \
+             {FLY_COUNT_MAX}",
             fitness.len()
-        )));
+        );
+        return Err(Error::parameter("population", reason));
     }
     encode_members(population, Some(fitness), meta, Thrift::Bytes)
 }
@@ -49,7 +50,7 @@ pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value
 /// evolution passes through.
 ///
 /// # Errors
-/// [`Error::Usage`], as from [`encode`].
+/// [`Error::Parameter`], as from [`encode`].
 pub fn encode_snapshot(population: &Population, meta: &Map<String, Value>) -> Result<Vec<u8>> {
     encode_members(population, None, meta, Thrift::Time)
 }
@@ -61,10 +62,13 @@ fn encode_members(
     thrift: Thrift,
 ) -> Result<Vec<u8>> {
     if let Some(key) = HEADER_KEYS.iter().find(|&&key| meta.contains_key(key)) {
-        return Err(Error::Usage(format!("the metadata of a population cannot have a `{key}`: the file has its own")));
+        return Err(Error::parameter("metadata", format!("a population cannot have a `{key}`: the file has its own")));
     }
-    write_members(population, fitness, meta, Members::new(thrift))
-        .map_err(|error| Error::Usage(format!("the population cannot be written: {error}")))
+    write_members(population, fitness, meta, Members::new(thrift)).map_err(|error| Error::Encoding {
+        what: "population",
+        format: "npz",
+        reason: error.to_string(),
+    })
 }
 
 fn write_members(

@@ -170,8 +170,8 @@ mod tests {
     fn the_first_failure_in_order_is_told() {
         let failed = side_by_side(9, |number| match number {
             0..4 => Ok(()),
-            _ => Err(Error::Usage(number.to_string())),
+            _ => Err(Error::parameter("number", number.to_string())),
         });
-        assert_eq!(failed.expect_err("five pieces fail").to_string(), "4");
+        assert_eq!(failed.expect_err("five pieces fail").to_string(), "number: 4");
     }
 }

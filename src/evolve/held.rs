@@ -103,7 +103,7 @@ impl Held {
     /// The picture that is held, with the weights of `target`.
     ///
     /// # Errors
-    /// [`crate::error::Error::TooLarge`] if the weights do not fit.
+    /// [`crate::error::Error::Parameter`] if the weights do not fit.
     pub fn picture(&self, target: &Target) -> Result<Target> {
         self.with_planes(self.colors().collect(), target)
     }

@@ -19,14 +19,14 @@ impl Palette {
     /// The palette of these colours, whose order breaks ties.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there are none, or more than [`PALETTE_COLORS_MAX`].
+    /// [`Error::Parameter`] if there are none, or more than [`PALETTE_COLORS_MAX`].
     pub fn new(colors: impl Into<Arc<[Rgb]>>) -> Result<Self> {
         let colors = colors.into();
         if !(1..=PALETTE_COLORS_MAX).contains(&colors.len()) {
-            return Err(Error::Usage(format!(
-                "a palette needs 1 to {PALETTE_COLORS_MAX} colours, this one has {}",
-                colors.len()
-            )));
+            return Err(Error::parameter(
+                "palette",
+                format!("must have 1 to {PALETTE_COLORS_MAX} colours, not {}", colors.len()),
+            ));
         }
         Ok(Self { colors })
     }

@@ -1,7 +1,7 @@
 //! How the work of a cell is cut for a device.
 
 use super::cells_state::Plan;
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::model::cells::Course;
 use crate::model::cells::pixel::TRANSLUCENT_DEPTH;
 use crate::vk::{DeviceInfo, DeviceKind};
@@ -43,10 +43,8 @@ impl CellShape {
     pub fn for_device(info: &DeviceInfo, course: &Course) -> Result<Self> {
         // All flies may lie in one cell, whose members are ranked eight in a turn of a loop.
         if info.kind == DeviceKind::Cpu && course.fly_count as u64 > 8 * u64::from(BUDGET) {
-            return Err(Error::TooLarge(format!(
-                "{} tiles are too many for one dispatch of software Vulkan; use fewer --tiles, or --device cpu",
-                course.fly_count
-            )));
+            let what = format!("{} tiles are too many for one dispatch of software Vulkan", course.fly_count);
+            return Err(Error::TooLarge { what, remedies: &[Remedy::FewerTiles, Remedy::Cpu] });
         }
         let narrow = Self { lanes: info.subgroup_size, form: CellForm::Narrow, budget: BUDGET };
         let wide = |lanes| Self { lanes, form: CellForm::Wide, budget: BUDGET };
@@ -55,20 +53,21 @@ impl CellShape {
         let lanes = (LANES_WIDE.ilog2()..=most.ilog2()).map(|power| 1 << power);
         let mut shapes = first.into_iter().chain(lanes.map(wide));
         shapes.find(|shape| shape.longest_step(course) <= u64::from(BUDGET)).ok_or_else(|| {
-            Error::TooLarge(format!(
-                "one step of {} candidates with tiles this large is too long for a dispatch of the Vulkan device; use more --tiles, fewer --candidates, or --device cpu",
+            let what = format!(
+                "one step of {} candidates with tiles this large is too long for a dispatch of the Vulkan device",
                 course.rules.candidates
-            ))
+            );
+            Error::TooLarge { what, remedies: &[Remedy::MoreTiles, Remedy::FewerCandidates, Remedy::Cpu] }
         })
     }
 
     /// Refuses a narrow workgroup that is not one subgroup.
     pub(super) fn check(self, info: &DeviceInfo) -> Result<()> {
         if self.form == CellForm::Narrow && self.lanes != info.subgroup_size {
-            return Err(Error::Usage(format!(
-                "a narrow workgroup has the {} invocations of a subgroup, not {}",
-                info.subgroup_size, self.lanes
-            )));
+            return Err(Error::parameter(
+                "lanes",
+                format!("a narrow workgroup has the {} of a subgroup, not {}", info.subgroup_size, self.lanes),
+            ));
         }
         Ok(())
     }

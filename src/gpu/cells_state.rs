@@ -2,7 +2,7 @@
 
 use super::cells_layout::{FlyRecord, SearchRules};
 use super::cells_pools::{LaneSlices, Pool};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::model::cells::glaze::opacity_of;
 use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
 use crate::model::cells::pixel::{BACKGROUND_Z, STACK_DEPTH, TRANSLUCENT_DEPTH, UNWANTED_ERROR, difference};
@@ -109,6 +109,9 @@ fn side_max(rules: &Rules) -> u32 {
     side.min(u64::from(SEARCH_SIDE_MAX)) as u32
 }
 
+/// What keeps sums of errors within 32 bits: tiles that cover fewer pixels, or the CPU, whose sums have 64.
+const SMALLER_TILES: [Remedy; 3] = [Remedy::MoreTiles, Remedy::SmallerPicture, Remedy::Cpu];
+
 /// Refuses what would not fit the 32 bits of fitness and changes, or of indices.
 pub(super) fn check(course: &Course) -> Result<()> {
     let Course { rules, target, .. } = course;
@@ -120,16 +123,15 @@ pub(super) fn check(course: &Course) -> Result<()> {
     // Two fitnesses add up to less than 2^31.
     // The penalty of a turn counts a tile's whole area, also beyond the picture.
     if pixels * most + side_px * side_px * u64::from(penalties.turn) >= 1 << 30 {
-        return Err(Error::TooLarge(format!(
-            "a tile may cover {pixels} pixels with an error of up to {most} each, which does not fit the 32 bits of a Vulkan device; use more --tiles, a smaller --size, or --device cpu"
-        )));
+        let what = format!(
+            "a tile may cover {pixels} pixels with an error of up to {most} each, which does not fit the 32 bits of a Vulkan device"
+        );
+        return Err(Error::TooLarge { what, remedies: &SMALLER_TILES });
     }
     check_gains(course)?;
     if course.fly_count >= FLY_COUNT_MAX {
-        return Err(Error::TooLarge(format!(
-            "{} tiles are more than a Vulkan device searches; use fewer --tiles, or --device cpu",
-            course.fly_count
-        )));
+        let what = format!("{} tiles are more than a Vulkan device searches", course.fly_count);
+        return Err(Error::TooLarge { what, remedies: &[Remedy::FewerTiles, Remedy::Cpu] });
     }
     Ok(())
 }
@@ -146,9 +148,10 @@ fn check_gains(course: &Course) -> Result<()> {
     });
     let most = all.min(side * side * weight) * UNWANTED_ERROR as u64;
     if course.is_translucent() && most >= 1 << 30 {
-        return Err(Error::TooLarge(format!(
-            "a cell of {side}x{side} pixels with translucent tiles may have an error of up to {most}, which does not fit the 32 bits of a Vulkan device; use more --tiles, a smaller --size, or --device cpu"
-        )));
+        let what = format!(
+            "a cell of {side}x{side} pixels with translucent tiles may have an error of up to {most}, which does not fit the 32 bits of a Vulkan device"
+        );
+        return Err(Error::TooLarge { what, remedies: &SMALLER_TILES });
     }
     Ok(())
 }

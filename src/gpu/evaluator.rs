@@ -9,7 +9,7 @@ use super::layout::Tile;
 use super::mosaic_pass::MosaicPass;
 use super::submission::Work;
 use super::translucent_pass::TranslucentPass;
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::model::{Blend, Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
 use crate::vk::{Buffer, Device, PassTime, Recorder, Timing};
 
@@ -67,7 +67,8 @@ impl GpuEvaluator {
         evaluator.make_room_for_translucent(&scenes.iter().collect::<Vec<_>>())?;
         for scene in scenes {
             evaluator.make_lane(scene)?.ok_or_else(|| {
-                Error::TooLarge("these pictures are too much for one Vulkan device at once; evolve fewer".to_owned())
+                let what = "these pictures are too much for one Vulkan device at once".to_owned();
+                Error::TooLarge { what, remedies: &[Remedy::FewerPictures] }
             })?;
         }
         evaluator.recorder.submit_and_wait()?;

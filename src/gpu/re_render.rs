@@ -5,7 +5,7 @@ use super::GpuEvaluator;
 use super::evaluate_pass::{Mode, Variant, create_pipeline};
 use super::evaluator::GpuLane;
 use super::layout::EvaluatePush;
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 use crate::model::Evaluator;
 use crate::vk::{Buffer, BufferUse, Residence};
 
@@ -16,16 +16,18 @@ impl GpuEvaluator {
     /// The marginal fitness of every fly of the only lane, by leaving each out of the picture that was loaded last.
     ///
     /// # Errors
-    /// [`Error::Usage`] unless there is one lane, whose lists fit a single dispatch; or if the device fails.
+    /// [`Error::Parameter`] unless there is one lane; [`Error::TooLarge`] unless its lists fit a single dispatch; or if
+    /// the device fails.
     pub fn marginal_by_re_rendering(&mut self) -> Result<Vec<i64>> {
         let [Some(GpuLane { lane, .. })] = &self.lanes[..] else {
-            return Err(Error::Usage("re-rendering works on one lane".to_owned()));
+            return Err(Error::parameter("scenes", "re-rendering works on one lane"));
         };
         let lists = lane.lists();
         let longest = (0..lists.block_count()).map(|block| lists.list(block).len()).max().unwrap_or(0);
         let entries: usize = (0..lists.block_count()).map(|block| lists.list(block).len()).sum();
         if entries > self.pass.entry_capacity() || longest > super::evaluate_pass::LIST_PIECE {
-            return Err(Error::TooLarge("re-rendering needs lists that fit a single dispatch".to_owned()));
+            let what = "re-rendering needs lists that fit a single dispatch".to_owned();
+            return Err(Error::TooLarge { what, remedies: &[Remedy::FewerTiles] });
         }
         let (fly_count, item_count) = (lane.tiles().len() as u32, lists.block_count() as u32);
         // The work of a full evaluation stays in the buffers.

@@ -41,10 +41,10 @@ impl Mask {
     /// A mask from its texels, row by row.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there are not exactly [`MASK_SIDE`]² texels.
+    /// [`Error::Parameter`] if there are not exactly [`MASK_SIDE`]² texels.
     pub fn new(texels: Vec<Texel>) -> Result<Self> {
         let wrong = |texels: Box<[Texel]>| {
-            Error::Usage(format!("a mask needs {MASK_SIDE}x{MASK_SIDE} texels, this one has {}", texels.len()))
+            Error::parameter("texels", format!("a mask needs {MASK_SIDE}x{MASK_SIDE}, not {}", texels.len()))
         };
         Ok(Self { texels: texels.into_boxed_slice().try_into().map_err(wrong)? })
     }
@@ -85,14 +85,13 @@ impl MaskSet {
     /// The set of the square and `others`, which become layers 1, 2, ...; opaque.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there are more than [`MASK_LAYERS_MAX`] layers.
+    /// [`Error::Parameter`] if there are more than [`MASK_LAYERS_MAX`] layers.
     pub fn with_layers(others: Vec<Mask>) -> Result<Self> {
         if others.len() >= MASK_LAYERS_MAX {
-            return Err(Error::Usage(format!(
-                "at most {} masks besides the square, not {}",
-                MASK_LAYERS_MAX - 1,
-                others.len()
-            )));
+            return Err(Error::parameter(
+                "mask",
+                format!("at most {} besides the square, not {}", MASK_LAYERS_MAX - 1, others.len()),
+            ));
         }
         let mut layers = vec![Mask::square()];
         layers.extend(others);

@@ -36,13 +36,14 @@ impl Target {
     /// A target of `width_px` x `height_px` from its pixels, row by row from the top.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] if a side is 0 or above [`TARGET_SIDE_MAX_PX`], or if the pixel count does not fit the size.
+    /// [`Error::Parameter`] if a side is 0 or above [`TARGET_SIDE_MAX_PX`], or if the pixel count does not fit.
     pub fn new(width_px: u32, height_px: u32, pixels: Vec<Rgb>) -> Result<Self> {
         let sides = 1..=TARGET_SIDE_MAX_PX;
         if !sides.contains(&width_px) || !sides.contains(&height_px) {
-            return Err(Error::TooLarge(format!(
-                "a picture of {width_px}x{height_px} px cannot be evolved: sides must be 1 to {TARGET_SIDE_MAX_PX} px"
-            )));
+            return Err(Error::parameter(
+                "picture",
+                format!("its sides must be 1 to {TARGET_SIDE_MAX_PX} px, not {width_px}x{height_px}"),
+            ));
         }
         check_count((width_px, height_px), pixels.len(), "pixels")?;
         Ok(Self { width_px, height_px, pixels, weights: None, transparent: None })
@@ -54,11 +55,11 @@ impl Target {
     /// target has none.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] if their count does not fit the size; [`Error::Usage`] if one is out of range.
+    /// [`Error::Parameter`] if their count does not fit the size, or if one is out of range.
     pub fn with_weights(mut self, mut weights: Vec<u8>) -> Result<Self> {
         check_count((self.width_px, self.height_px), weights.len(), "weights")?;
         if let Some(wrong) = weights.iter().find(|weight| !(1..=WEIGHT_MAX).contains(*weight)) {
-            return Err(Error::Usage(format!("the weight of a pixel is 1 to {WEIGHT_MAX}, not {wrong}")));
+            return Err(Error::parameter("weights", format!("each must be 1 to {WEIGHT_MAX}, not {wrong}")));
         }
         let divisor = weights.iter().copied().fold(0, greatest_common_divisor);
         weights.iter_mut().for_each(|weight| *weight /= divisor);
@@ -69,9 +70,9 @@ impl Target {
     /// The same pixels, where no tile is wanted at those that are true, row by row from the top; if none is, all is opaque.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] if their count does not fit the size.
+    /// [`Error::Parameter`] if their count does not fit the size.
     pub fn with_transparent(mut self, transparent: Vec<bool>) -> Result<Self> {
-        check_count((self.width_px, self.height_px), transparent.len(), "pixels that are transparent or not")?;
+        check_count((self.width_px, self.height_px), transparent.len(), "transparent")?;
         self.transparent = Some(transparent).filter(|transparent| transparent.contains(&true));
         Ok(self)
     }
@@ -108,11 +109,11 @@ impl Target {
     }
 }
 
-fn check_count((width_px, height_px): (u32, u32), count: usize, what: &str) -> Result<()> {
+fn check_count((width_px, height_px): (u32, u32), count: usize, name: &str) -> Result<()> {
     if count == width_px as usize * height_px as usize {
         return Ok(());
     }
-    Err(Error::TooLarge(format!("a picture of {width_px}x{height_px} px cannot have {count} {what}")))
+    Err(Error::parameter(name, format!("a picture of {width_px}x{height_px} px cannot have {count}")))
 }
 
 fn greatest_common_divisor(a: u8, b: u8) -> u8 {

@@ -70,7 +70,7 @@ pub fn encode_with_alpha(format: Format, photo: &Photo, alpha: Option<&[u8]>, me
 /// The photo as an 8-bit RGB PNG with an sRGB chunk and the metadata as text chunks.
 ///
 /// # Errors
-/// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]) or the photo has no pixels.
+/// [`Error::Parameter`] if the metadata does not fit (see [`Metadata`]), [`Error::Encoding`] if there are no pixels.
 pub fn encode_png(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
     metadata::check(metadata)?;
     let size_px = (photo.width_px, photo.height_px);
@@ -78,7 +78,7 @@ pub fn encode_png(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
 }
 
 fn not_png(error: &png::EncodingError) -> Error {
-    Error::Usage(format!("the picture cannot be written as PNG: {error}"))
+    Error::picture_as("PNG", error)
 }
 
 fn png_bytes(
@@ -107,8 +107,8 @@ fn png_bytes(
 /// Pixels with alpha, not premultiplied, as an 8-bit RGBA PNG with an sRGB chunk and the metadata as text chunks.
 ///
 /// # Errors
-/// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]), or if there are not `width_px * height_px` pixels, or
-/// none.
+/// [`Error::Parameter`] if the metadata does not fit (see [`Metadata`]); [`Error::Encoding`] if there are not
+/// `width_px * height_px` pixels, or none.
 pub fn encode_png_with_alpha(
     width_px: u32,
     height_px: u32,
@@ -138,14 +138,14 @@ fn png_encoder(
 /// The photo as a JPEG of `quality` 1 to 100, without colour subsampling, with the metadata as comments.
 ///
 /// # Errors
-/// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]), `quality` is out of range, or a side of the photo
-/// is 0 or above 65,535 px.
+/// [`Error::Parameter`] if the metadata does not fit (see [`Metadata`]) or `quality` is out of range;
+/// [`Error::Encoding`] if a side of the photo is 0 or above 65,535 px.
 pub fn encode_jpeg(photo: &Photo, quality: u8, metadata: &Metadata) -> Result<Vec<u8>> {
     metadata::check(metadata)?;
     if !(1..=100).contains(&quality) {
-        return Err(Error::Usage(format!("the quality of a JPEG is 1 to 100, not {quality}")));
+        return Err(Error::parameter("quality", format!("a JPEG's must be 1 to 100, not {quality}")));
     }
-    let refused = |why: &dyn std::fmt::Display| Error::Usage(format!("the picture cannot be written as JPEG: {why}"));
+    let refused = |why: &dyn std::fmt::Display| Error::picture_as("JPEG", why);
     if photo.pixels.is_empty() {
         return Err(refused(&"it has no pixels"));
     }
@@ -162,8 +162,8 @@ pub fn encode_jpeg(photo: &Photo, quality: u8, metadata: &Metadata) -> Result<Ve
 /// The photo as a lossless WebP with the metadata as an XMP packet.
 ///
 /// # Errors
-/// [`Error::Usage`] if the metadata does not fit (see [`Metadata`]), or a side of the photo is 0 or above
-/// [`webp::WEBP_SIDE_MAX_PX`].
+/// [`Error::Parameter`] if the metadata does not fit (see [`Metadata`]); [`Error::Encoding`] if a side of the photo is
+/// 0 or above [`webp::WEBP_SIDE_MAX_PX`].
 pub fn encode_webp(photo: &Photo, metadata: &Metadata) -> Result<Vec<u8>> {
     webp_bytes((photo.width_px, photo.height_px), ExtendedColorType::Rgb8, photo.pixels.as_flattened(), metadata)
 }
@@ -176,15 +176,15 @@ fn webp_bytes(
 ) -> Result<Vec<u8>> {
     metadata::check(metadata)?;
     if samples.is_empty() || width_px.max(height_px) > webp::WEBP_SIDE_MAX_PX {
-        return Err(Error::Usage(format!(
-            "the picture cannot be written as WebP: its sides must be 1 to {} px, not {width_px}x{height_px}",
-            webp::WEBP_SIDE_MAX_PX
-        )));
+        return Err(Error::picture_as(
+            "WebP",
+            &format!("its sides must be 1 to {} px, not {width_px}x{height_px}", webp::WEBP_SIDE_MAX_PX),
+        ));
     }
     let mut bytes = Vec::new();
     WebPEncoder::new_lossless(&mut bytes)
         .encode(samples, width_px, height_px, color)
-        .map_err(|error| Error::Usage(format!("the picture cannot be written as WebP: {error}")))?;
+        .map_err(|error| Error::picture_as("WebP", &error))?;
     if metadata.is_empty() {
         return Ok(bytes);
     }

@@ -27,12 +27,14 @@ pub(super) fn check(metadata: &Metadata) -> Result<()> {
     for (keyword, text) in metadata {
         let printable = keyword.bytes().all(|byte| matches!(byte, b' '..=b'~') && byte != b'=');
         if !printable || !(1..=79).contains(&keyword.len()) || keyword.trim() != keyword {
-            return Err(Error::Usage(format!(
-                "{keyword:?} cannot be a metadata keyword: 1 to 79 ASCII characters without ="
-            )));
+            return Err(Error::parameter(
+                "metadata",
+                format!("{keyword:?} cannot be a keyword: 1 to 79 ASCII characters without ="),
+            ));
         }
         if text.contains('\0') || keyword.len() + 1 + text.len() > jpeg_segments::PAYLOAD_BYTES_MAX {
-            return Err(Error::Usage(format!("the metadata {keyword:?} is longer than 65,532 bytes or holds a NUL")));
+            let reason = format!("{keyword:?} is longer than 65,532 bytes or holds a NUL");
+            return Err(Error::parameter("metadata", reason));
         }
     }
     Ok(())

@@ -26,14 +26,15 @@ const TEXT_BYTES_MAX: u64 = 1 << 20;
 /// quantiser, or their own colours if there are no more than that.
 ///
 /// # Errors
-/// [`Error::Usage`] if there are no pixels.
+/// [`Error::Parameter`] if there are no pixels.
 pub fn palette_of(pixels: &[[u8; 3]], color_count: usize) -> Result<Vec<[u8; 3]>> {
     let size = PaletteSize::from_usize_clamped(color_count);
     let mut palette = distinct_colors(pixels, size.as_usize()).map_or_else(
         || {
             let colors: &[Srgb<u8>] = from_array_slice(pixels);
-            let counted = WuU8x3::run_slice(colors, BinnerU8x3::rgb())
-                .map_err(|error| Error::Usage(format!("the picture cannot be reduced to few colours: {error}")))?;
+            let counted = WuU8x3::run_slice(colors, BinnerU8x3::rgb()).map_err(|error| {
+                Error::parameter("pixels", format!("they cannot be reduced to few colours: {error}"))
+            })?;
             Ok(counted.palette(size).into_vec().into_iter().map(<[u8; 3]>::from).collect())
         },
         Ok::<Vec<[u8; 3]>, Error>,
@@ -86,7 +87,9 @@ pub(super) fn nearest(color: [u8; 3], palette: &[[u8; 3]]) -> [u8; 3] {
 /// [`Error::Input`] if the file cannot be read, is none of these, or has no colour or more than [`COLOR_COUNT_MAX`].
 pub fn read_palette(path: &Path) -> Result<Vec<[u8; 3]>> {
     let refused = |reason: String| Error::input(path, reason);
-    let too_many = || refused(format!("has more than {COLOR_COUNT_MAX} colours; reduce it, or use --colors"));
+    let too_many = || {
+        refused(format!("has more than {COLOR_COUNT_MAX} colours; reduce it, or ask for a number of colours instead"))
+    };
     if is_picture(path)? {
         let picture = read(path, &ReadOptions::default())?.photo;
         return distinct_colors(&picture.pixels, COLOR_COUNT_MAX).ok_or_else(too_many);

@@ -92,8 +92,8 @@ impl FromStr for BuiltIn {
 
     fn from_str(name: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|shape| shape.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            Error::Usage(format!("there is no built-in mask `{name}`; there are {names}"))
+            let known = Self::ALL.map(Self::name).join(", ");
+            Error::UnknownName { what: "built-in mask", name: name.to_owned(), known }
         })
     }
 }

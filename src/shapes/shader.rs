@@ -122,8 +122,8 @@ impl FromStr for Shader {
 
     fn from_str(name: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|shader| shader.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            Error::Usage(format!("there is no shader `{name}`; there are {names}"))
+            let known = Self::ALL.map(Self::name).join(", ");
+            Error::UnknownName { what: "shader", name: name.to_owned(), known }
         })
     }
 }

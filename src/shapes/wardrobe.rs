@@ -34,8 +34,8 @@ impl Wardrobe {
     /// [`Blend::Opaque`] it means nothing.
     ///
     /// # Errors
-    /// [`Error::Input`] naming the file, or [`Error::Usage`] for a built-in template, if an outfit would cover nothing;
-    /// [`Error::Usage`] if there are more masks than a set can hold.
+    /// If an outfit would cover nothing: [`Error::Input`] naming the file, or [`Error::Parameter`] for a built-in
+    /// template. [`Error::Parameter`] if there are more masks than a set can hold.
     pub fn new(outfits: &[Outfit], blend: Blend, opacity: NonZeroU8) -> Result<Self> {
         let mut others: Vec<Mask> = Vec::new();
         let mut layers = Vec::with_capacity(outfits.len());
@@ -84,6 +84,6 @@ fn covers_nothing(outfit: &Outfit) -> Error {
     );
     match outfit.template.source() {
         Source::File(path) => Error::input(path, reason),
-        Source::BuiltIn(shape) => Error::Usage(format!("the mask `{shape}`: {reason}")),
+        Source::BuiltIn(shape) => Error::parameter("mask", format!("`{shape}`: {reason}")),
     }
 }

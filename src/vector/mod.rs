@@ -37,7 +37,7 @@ const HEADER_BYTES: u64 = 1 << 20;
 /// The population as an SVG document whose `width` and `height` are those of `canvas`; `told` is its metadata.
 ///
 /// # Errors
-/// [`Error::Usage`] if the picture of a mask cannot be encoded.
+/// [`Error::Encoding`] if the picture of a mask cannot be encoded.
 pub fn encode(population: &Population, canvas: &Canvas, told: &Map<String, Value>) -> Result<Vec<u8>> {
     let order = depth_order(&population.flies);
     let flies: Vec<&Fly> =

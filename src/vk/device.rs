@@ -12,7 +12,7 @@ use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use super::observe::{Calibrated, clock_extension};
 use super::physical::{self, DeviceInfo};
 use super::{Instance, SubmissionObserver, call_failed, lock, refused};
-use crate::error::{Error, Result};
+use crate::error::{Error, NoDevice, Result};
 
 const PORTABILITY_SUBSET: &CStr = c"VK_KHR_portability_subset";
 const MIB: u64 = 1 << 20;
@@ -74,9 +74,8 @@ impl Device {
     /// [`Error::NoSuitableDevice`] if it lacks something or is no longer there; [`Error::Vulkan`] if the driver refuses.
     pub fn create(instance: &Arc<Instance>, info: &DeviceInfo, options: &DeviceOptions) -> Result<Arc<Self>> {
         let physical = find_physical(instance, info)?;
-        let (queue_family, _) = physical::queue_family(instance.raw(), physical).ok_or_else(|| {
-            Error::NoSuitableDevice { why: format!("{} has no queue for graphics and compute", info.name) }
-        })?;
+        let (queue_family, _) = physical::queue_family(instance.raw(), physical)
+            .ok_or_else(|| lacks(info, vec!["a queue for graphics and compute".to_owned()]))?;
         let clock = clock_extension(instance, physical)?;
         let functions = create_raw(instance, (physical, info), queue_family, clock)?;
         let debug_utils = instance.has_debug_utils().then(|| debug_utils::Device::new(instance.raw(), &functions));
@@ -210,13 +209,17 @@ impl Drop for Device {
     }
 }
 
+fn lacks(info: &DeviceInfo, missing: Vec<String>) -> Error {
+    Error::NoSuitableDevice { why: NoDevice::Lacks { request: None, device: info.name.clone(), missing } }
+}
+
 /// The handle behind a description, checked in case a device came or went in between.
 fn find_physical(instance: &Instance, info: &DeviceInfo) -> Result<vk::PhysicalDevice> {
     if !info.missing.is_empty() {
-        return Err(Error::NoSuitableDevice { why: format!("{} lacks {}", info.name, info.missing.join(", ")) });
+        return Err(lacks(info, info.missing.clone()));
     }
     let handles = instance.physical_handles()?;
-    let gone = || Error::NoSuitableDevice { why: format!("{} is no longer there; run again", info.name) };
+    let gone = || Error::NoSuitableDevice { why: NoDevice::Gone { device: info.name.clone() } };
     let handle = *handles.get(info.index).ok_or_else(gone)?;
     let now = physical::describe(instance.raw(), handle, info.index)?;
     if now.uuid == info.uuid { Ok(handle) } else { Err(gone()) }

@@ -10,7 +10,7 @@ use gpu_allocator::MemoryLocation;
 use super::handle::Owned;
 use super::memory::{Memory, Purpose};
 use super::{Device, call_failed, refused, submit};
-use crate::error::{Error, Result};
+use crate::error::{Error, Remedy, Result};
 
 /// What a pixel of an image holds, and with it what the image is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -175,10 +175,11 @@ fn check_shape(name: &str, shape: ImageShape, device: &Device) -> Result<()> {
         return Err(refused(format!("creation of image {name}"), "an image needs a pixel at least"));
     }
     if width_px.max(height_px) > limits.image_side_px || layers > limits.image_layers {
-        return Err(Error::TooLarge(format!(
-            "image {name} of {width_px}x{height_px} px with {layers} layers is past the device's limit of {} px and {} layers; use a smaller size, or --device cpu",
+        let what = format!(
+            "image {name} of {width_px}x{height_px} px with {layers} layers is past the device's limit of {} px and {} layers",
             limits.image_side_px, limits.image_layers
-        )));
+        );
+        return Err(Error::TooLarge { what, remedies: &[Remedy::SmallerPicture, Remedy::Cpu] });
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use ash::vk;
 use super::call_failed;
 use super::messages::{Messenger, ValidationLog};
 use super::physical::{self, DeviceInfo};
-use crate::error::{Error, Result};
+use crate::error::{Error, NoDevice, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 const VALIDATION_FEATURES: &CStr = c"VK_EXT_validation_features";
@@ -165,11 +165,7 @@ fn require_vulkan_1_3(entry: &ash::Entry) -> Result<()> {
     if version >= vk::API_VERSION_1_3 {
         return Ok(());
     }
-    Err(no_device(format!(
-        "the Vulkan loader only knows Vulkan {}.{} and 1.3 is needed; install a newer libvulkan1, or use --device cpu",
-        vk::api_version_major(version),
-        vk::api_version_minor(version)
-    )))
+    Err(no_device(NoDevice::OldLoader { major: vk::api_version_major(version), minor: vk::api_version_minor(version) }))
 }
 
 fn create_raw(
@@ -200,38 +196,27 @@ fn create_raw(
     unsafe { entry.create_instance(&info, None) }.map_err(explain_creation)
 }
 
-fn no_device(why: String) -> Error {
+fn no_device(why: NoDevice) -> Error {
     Error::NoSuitableDevice { why }
 }
 
 fn no_loader(error: &ash::LoadingError) -> Error {
-    no_device(format!(
-        "the Vulkan loader cannot be opened ({error}); install libvulkan1 and a driver such as mesa-vulkan-drivers, or use --device cpu"
-    ))
+    no_device(NoDevice::NoLoader { reason: error.to_string() })
 }
 
-/// The sentence for a failure on the way to an instance.
+/// The error of a failure on the way to an instance.
 fn explain_creation(result: vk::Result) -> Error {
     match result {
-        vk::Result::ERROR_INCOMPATIBLE_DRIVER => no_device(
-            "no Vulkan driver is installed; install mesa-vulkan-drivers or the driver of the GPU's vendor, or use --device cpu"
-                .to_owned(),
-        ),
-        vk::Result::ERROR_LAYER_NOT_PRESENT => no_device(
-            "the validation layer VK_LAYER_KHRONOS_validation is not installed; install vulkan-validationlayers, or run without --validate"
-                .to_owned(),
-        ),
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => no_device(NoDevice::NoDriver),
+        vk::Result::ERROR_LAYER_NOT_PRESENT => no_device(NoDevice::NoValidationLayer),
         other => call_failed("vkCreateInstance", other),
     }
 }
 
-/// The sentence for a failure to list the devices of an instance.
+/// The error of a failure to list the devices of an instance.
 fn explain_enumeration(result: vk::Result) -> Error {
     match result {
-        vk::Result::ERROR_INITIALIZATION_FAILED => no_device(
-            "a Vulkan driver is installed but found no hardware that it drives; install mesa-vulkan-drivers for software Vulkan, or use --device cpu"
-                .to_owned(),
-        ),
+        vk::Result::ERROR_INITIALIZATION_FAILED => no_device(NoDevice::NoHardware),
         other => call_failed("vkEnumeratePhysicalDevices", other),
     }
 }
@@ -247,7 +232,7 @@ mod tests {
             (explain_creation(vk::Result::ERROR_LAYER_NOT_PRESENT), "install vulkan-validationlayers"),
             (explain_enumeration(vk::Result::ERROR_INITIALIZATION_FAILED), "install mesa-vulkan-drivers"),
         ] {
-            assert!(matches!(&error, Error::NoSuitableDevice { why } if why.contains(package)), "{error}");
+            assert!(matches!(&error, Error::NoSuitableDevice { why } if why.to_string().contains(package)), "{error}");
         }
     }
 }

@@ -5,9 +5,9 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{DeviceInfo, DeviceKind};
-use crate::error::{Error, Result};
+use crate::error::{Error, NoDevice, Result};
 
-/// What the user asked for with `--device`.
+/// The device that somebody asks for. The words for it are those that it is displayed as.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum DeviceRequest {
     /// The best hardware GPU, else the CPU twin.
@@ -32,9 +32,8 @@ impl FromStr for DeviceRequest {
 
     fn from_str(text: &str) -> Result<Self> {
         let wrong = || {
-            Error::Usage(format!(
-                "--device {text}: expected auto, cpu, vulkan, a number, uuid:HEX, pci:0000:65:00.0 or name:PART"
-            ))
+            let forms = "auto, cpu, vulkan, a number, uuid:HEX, pci:0000:65:00.0 or name:PART";
+            Error::parameter("device", format!("expected {forms}, not `{text}`"))
         };
         let lower = text.trim().to_lowercase();
         match lower.as_str() {
@@ -136,15 +135,12 @@ fn choose_among(request: &DeviceRequest, devices: &[DeviceInfo], fits: impl Fn(&
         return Ok(Choice::Vulkan(best.index));
     }
     let why = match fitting().next() {
-        Some(unusable) => format!(
-            "--device {request} is {}, which lacks {}; choose another, or --device cpu",
-            unusable.name,
-            unusable.missing.join(", ")
-        ),
-        None if devices.is_empty() => {
-            format!("--device {request} was asked for and Vulkan lists no device; use --device cpu")
-        }
-        None => format!("--device {request} fits no device; choose {}, or --device cpu", list(devices)),
+        Some(unusable) => NoDevice::Lacks {
+            request: Some(request.to_string()),
+            device: unusable.name.clone(),
+            missing: unusable.missing.clone(),
+        },
+        None => NoDevice::Unlisted { request: request.to_string(), devices: list(devices) },
     };
     Err(Error::NoSuitableDevice { why })
 }
@@ -161,8 +157,8 @@ fn rank(device: &DeviceInfo) -> (u8, Reverse<u64>, usize) {
     (kind, Reverse(device.memory_bytes), device.index)
 }
 
-fn list(devices: &[DeviceInfo]) -> String {
-    devices.iter().map(|device| format!("{} ({})", device.index, device.name)).collect::<Vec<_>>().join(", ")
+fn list(devices: &[DeviceInfo]) -> Vec<String> {
+    devices.iter().map(|device| format!("{} ({})", device.index, device.name)).collect()
 }
 
 #[cfg(test)]
@@ -216,7 +212,7 @@ mod tests {
         choose(&request.parse()?, devices)
     }
 
-    fn refusal(request: &str, devices: &[DeviceInfo]) -> String {
+    fn refusal(request: &str, devices: &[DeviceInfo]) -> NoDevice {
         match chosen(request, devices) {
             Err(Error::NoSuitableDevice { why }) => why,
             other => panic!("{request} gave {other:?}"),
@@ -243,12 +239,15 @@ mod tests {
     }
 
     #[test]
-    fn a_request_of_unknown_form_is_a_usage_error_that_quotes_it() {
+    fn a_request_of_unknown_form_is_refused_and_quoted() {
         for text in
             ["", "gpu", "-1", "uuid:12", "uuid:", "pci:65", "pci::65:00.0", "pci:zz:00.0", "name:", "name: ", "x:y"]
         {
             match text.parse::<DeviceRequest>() {
-                Err(Error::Usage(why)) => assert!(why.contains(text) && why.contains("expected"), "{why}"),
+                Err(Error::Parameter { name, reason }) => {
+                    assert_eq!(name, "device");
+                    assert!(reason.contains(&format!("`{text}`")) && reason.contains("expected"), "{reason}");
+                }
                 other => panic!("{text:?} gave {other:?}"),
             }
         }
@@ -301,19 +300,21 @@ mod tests {
 
     #[test]
     fn a_request_that_nothing_fits_lists_what_there_is() {
-        let why = refusal("name:radeon", &machine());
+        let why = refusal("name:radeon", &machine()).to_string();
         for part in ["name:radeon", "0 (llvmpipe (LLVM 15))", "4 (GeForce large)"] {
             assert!(why.contains(part), "{why}");
         }
-        assert!(refusal("vulkan", &[]).contains("lists no device"));
-        assert!(refusal("9", &machine()).contains("--device 9 fits no device; choose 0 ("));
+        assert_eq!(refusal("vulkan", &[]), NoDevice::Unlisted { request: "vulkan".to_owned(), devices: Vec::new() });
+        assert_eq!(refusal("9", &machine()), NoDevice::Unlisted { request: "9".to_owned(), devices: list(&machine()) });
     }
 
     #[test]
     fn a_device_that_lacks_something_is_refused_with_what_it_lacks() {
         let mut devices = machine();
-        devices[1].missing = vec!["the feature maintenance4".to_owned(), "Vulkan 1.3".to_owned()];
+        let missing = vec!["the feature maintenance4".to_owned(), "Vulkan 1.3".to_owned()];
+        devices[1].missing.clone_from(&missing);
         let why = refusal("1", &devices);
-        assert!(why.contains("Iris") && why.contains("the feature maintenance4, Vulkan 1.3"), "{why}");
+        assert_eq!(why.to_string(), "Iris lacks the feature maintenance4, Vulkan 1.3");
+        assert_eq!(why, NoDevice::Lacks { request: Some("1".to_owned()), device: "Iris".to_owned(), missing });
     }
 }

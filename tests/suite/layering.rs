@@ -203,6 +203,21 @@ fn only_vk_is_unsafe_and_only_the_app_prints_or_reads_the_clock_or_the_environme
 }
 
 #[test]
+fn only_the_app_names_flags() {
+    let names_a_flag = |line: &str| {
+        line.match_indices("--").any(|(at, _)| line[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()))
+    };
+    let mut complaints = Vec::new();
+    for source in sources().into_iter().filter(|source| !["app", "main"].contains(&source.module.as_str())) {
+        for (line, text) in (1..).zip(source.text.lines().map(code)).filter(|(_, text)| names_a_flag(text)) {
+            let path = source.path.display();
+            complaints.push(format!("{path}:{line} names a flag: `{}`; app/advice.rs adds the flags", text.trim()));
+        }
+    }
+    assert_none(&complaints);
+}
+
+#[test]
 fn no_source_file_is_too_long_to_read_at_once() {
     let long = sources().into_iter().map(|source| (source.path, source.text.lines().count()));
     let complaints: Vec<String> = long

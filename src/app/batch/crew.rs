@@ -7,8 +7,9 @@ use std::time::{Duration, Instant};
 
 use super::pipeline::{Done, Pipeline, Ready, Told, unless_it_panics};
 use super::queue::Queue;
+use crate::app::advice::why_no_vulkan;
 use crate::app::cells;
-use crate::app::device::{Selected, why_no_vulkan};
+use crate::app::device::Selected;
 use crate::app::options::SchemeOptions;
 use crate::app::outputs::Drawn;
 use crate::app::prepared;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::manifest::{ManifestRow, Outputs};
 use super::name::{Known, NameTemplate};
+use crate::app::advice;
 use crate::app::destination::{Destination, place_of};
 use crate::app::inputs::Found;
 use crate::app::inside::Tracer;
@@ -104,7 +105,7 @@ pub(super) fn gather(
         let common = match known.get(&flags) {
             Some(common) => Arc::clone(common),
             None => {
-                let common = Arc::new(options_with(&flags).map_err(|error| refuse(error.to_string()))?);
+                let common = Arc::new(options_with(&flags).map_err(|error| refuse(advice::sentence(&error)))?);
                 known.insert(flags, Arc::clone(&common));
                 common
             }

@@ -41,7 +41,7 @@ use super::picture::PictureArgs;
 use super::progress::Progress;
 use super::report::{self, Row, Status};
 use super::shard::{self, ShardChoice};
-use super::{memory, values};
+use super::{advice, memory, values};
 use crate::error::{Error, Result};
 use crate::output::Journal;
 use crate::vk::Validation;
@@ -133,8 +133,8 @@ pub(super) fn make(args: &BatchArgs, cli: &Cli) -> ExitCode {
     match run(args, cli) {
         Ok(exit_code) => ExitCode::from(exit_code),
         Err(error) => {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
+            report::error(&advice::sentence(&error));
+            ExitCode::from(advice::exit_code(&error))
         }
     }
 }

@@ -9,6 +9,7 @@ use serde_json::json;
 use super::measure::{Lap, Measurement, Unit, repeat};
 use super::passes;
 use super::workload::{self, Pictures, SIDES_PX};
+use crate::app::advice;
 use crate::app::device::Selected;
 use crate::app::options::Verbosity;
 use crate::app::progress::{Progress, Stage, short_time};
@@ -102,9 +103,9 @@ impl<'a> Bench<'a> {
     /// A device that cannot make a search has no figures of it; whoever asked for it learns what the others are.
     fn unless_unable(&mut self, done: Result<()>, row: &str, verbosity: Verbosity) -> Result<()> {
         match done {
-            Err(error @ (Error::NoSuitableDevice { .. } | Error::TooLarge(_))) => {
+            Err(error @ (Error::NoSuitableDevice { .. } | Error::TooLarge { .. })) => {
                 if verbosity > Verbosity::Quiet {
-                    report::say(&format!("smalti: no figures of {row}: {error}"));
+                    report::say(&format!("smalti: no figures of {row}: {}", advice::sentence(&error)));
                 }
                 self.note([]);
                 Ok(())

@@ -9,6 +9,7 @@ use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 
 use super::GroutColor;
+use crate::app::advice;
 use crate::app::look::BlendName;
 use crate::app::options::in_range;
 use crate::app::picture::PictureArgs;
@@ -122,7 +123,7 @@ impl FromText for crate::model::Rgb {
 
 impl FromText for Shader {
     fn from_text(text: &str) -> Result<Self, String> {
-        text.parse().map_err(|error: Error| error.to_string())
+        text.parse().map_err(|error| advice::sentence(&error))
     }
 }
 
@@ -245,7 +246,7 @@ impl PresetFile {
             ("patience", self.patience, (1, u64::MAX)),
         ] {
             if let Some(value) = value {
-                in_range(&format!("{word} ="), value, bounds).map_err(|error| error.to_string())?;
+                in_range(&format!("{word} ="), value, bounds).map_err(|error| advice::sentence(&error))?;
             }
         }
         if self.classes.len() > CLASSES_MAX {

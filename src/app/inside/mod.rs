@@ -21,7 +21,7 @@ pub(super) use self::tracer::Tracer;
 use super::destination;
 use super::device::Selected;
 use super::options::Overwrite;
-use crate::error::{Error, Result};
+use crate::error::{Error, NoDevice, Result};
 
 /// The flags.
 #[derive(Clone, Debug, Args)]
@@ -78,7 +78,7 @@ pub(super) fn trace_device(tracer: &Tracer, selected: &Selected) {
 pub(super) fn begin_capture(range: CaptureRange, selected: &Selected) -> Result<Arc<Capture>> {
     let Selected::Vulkan { device, .. } = selected else {
         let why = "--capture records a Vulkan device, and the CPU would compute; name one, such as --device vulkan";
-        return Err(Error::NoSuitableDevice { why: why.to_owned() });
+        return Err(Error::NoSuitableDevice { why: NoDevice::Other(why.to_owned()) });
     };
     let capture = Arc::new(Capture::new(range, device)?);
     device.observe(Arc::<Capture>::clone(&capture));

@@ -150,6 +150,7 @@ mod tests {
     use tempfile::TempDir;
 
     use super::*;
+    use crate::app::advice;
 
     fn line(id: &str, status: &str, evolve_ms: f64) -> String {
         format!(r#"{{"id":"{id}","status":"{status}","evolve_ms":{evolve_ms},"anything":[1]}}"#)
@@ -244,7 +245,7 @@ mod tests {
     fn a_file_without_any_row_is_refused_by_its_name() {
         let (_folder, paths) = files(&["first line\nsecond line\n".to_owned()]);
         let refusal = Rows::default().read(&paths[0]).expect_err("it is prose");
-        assert_eq!(refusal.exit_code(), 2);
+        assert_eq!(advice::exit_code(&refusal), 2);
         assert!(refusal.to_string().contains("0.jsonl: holds no rows"), "{refusal}");
         let refusal = Rows::default().read(Path::new("no/such.jsonl")).expect_err("it is not there");
         assert!(refusal.to_string().contains("there is no such file"), "{refusal}");

@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::app::advice;
 use crate::app::child::in_its_own_group;
 use crate::app::interrupt::Interrupt;
 use crate::model::mask::{MASK_SIDE, Mask};
@@ -65,7 +66,7 @@ impl Files<'_> {
         let side = f64::from(picture.width_px) * f64::from(picture.height_px) / stroke_count as f64;
         let settings = settings(side.sqrt());
         let files: [(&str, Vec<u8>); 4] = [
-            ("in.png", photo::encode_png(picture, &photo::Metadata::new()).map_err(|error| error.to_string())?),
+            ("in.png", photo::encode_png(picture, &photo::Metadata::new()).map_err(|error| advice::sentence(&error))?),
             ("scripts/smalti.scm", SCRIPT.as_bytes().to_vec()),
             ("gimpressionist/Presets/smalti", settings.into_bytes()),
             ("gimpressionist/Brushes/smalti.pgm", brush(mask)),

@@ -104,6 +104,7 @@ fn write_list(folder: &Path, list: &List) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::advice;
 
     fn files(names: &[&str], text: &str) -> BTreeMap<String, String> {
         names.iter().map(|name| ((*name).to_owned(), format!("{name}: {text}\n"))).collect()
@@ -135,7 +136,7 @@ mod tests {
         fs::write(folder.join("a"), "mine").expect("the folder is ours");
         let first = files(&["a", "b"], "first");
         let refusal = write(folder, &first, Overwrite::Refuse).expect_err("a is not of a plan");
-        assert_eq!((refusal.exit_code(), names(folder)), (2, vec!["a".to_owned()]));
+        assert_eq!((advice::exit_code(&refusal), names(folder)), (2, vec!["a".to_owned()]));
         write(folder, &first, Overwrite::Force).expect("it may be replaced");
         fs::write(folder.join("b"), "edited").expect("the folder is ours");
         write(folder, &files(&["a", "b"], "second"), Overwrite::Refuse).expect_err("b was edited");

@@ -11,8 +11,8 @@ use self::options::TimelapseOptions;
 use super::film::{self, End, Film, Shown, Studio};
 use super::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use super::progress::Progress;
-use super::report;
 use super::snapshots::{self, Snapshot};
+use super::{advice, report};
 use crate::archive;
 use crate::error::Result;
 use crate::model::Canvas;
@@ -28,8 +28,8 @@ pub(super) fn make(args: &TimelapseArgs) -> ExitCode {
             ExitCode::from(EXIT_INTERRUPTED)
         }
         Err(error) => {
-            report::error(&error.to_string());
-            ExitCode::from(error.exit_code())
+            report::error(&advice::sentence(&error));
+            ExitCode::from(advice::exit_code(&error))
         }
     }
 }

@@ -25,7 +25,7 @@ use super::options::Verbosity;
 use super::picture::SchemeName;
 use super::progress::Progress;
 use super::report::{self, Row, Status};
-use super::{destination, film as animation, inside};
+use super::{advice, destination, film as animation, inside};
 use crate::error::{Error, Result};
 
 pub(super) use self::options::VideoArgs;
@@ -38,17 +38,17 @@ pub(super) fn make(args: &VideoArgs) -> ExitCode {
     let mut totals = Totals { id: "total", status: "failed", ..Totals::default() };
     let done = VideoOptions::new(args).and_then(|options| shoot_traced(options, args, &mut totals));
     if let Err(error) = &done {
-        totals.error = Some(error.to_string());
+        totals.error = Some(advice::sentence(error));
         totals.status = if matches!(error, Error::Interrupted) { "partial" } else { "failed" };
-        report::error(&error.to_string());
+        report::error(&advice::sentence(error));
     }
     let printed = if args.json { report::print_json(&totals) } else { Ok(()) };
     if let Err(error) = &printed {
-        report::error(&error.to_string());
+        report::error(&advice::sentence(error));
     }
     match done.and(printed) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => ExitCode::from(error.exit_code()),
+        Err(error) => ExitCode::from(advice::exit_code(&error)),
     }
 }
 

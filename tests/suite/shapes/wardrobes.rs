@@ -73,5 +73,5 @@ fn a_wardrobe_holds_as_many_masks_as_a_set_and_no_more() {
     let found = wardrobe(&outfits[1..], Blend::Opaque, 255).unwrap();
     assert_eq!(found.layers.last(), Some(&255));
     let refusal = wardrobe(&outfits, Blend::Opaque, 255).unwrap_err();
-    assert_eq!(refusal.to_string(), "at most 255 masks besides the square, not 256");
+    assert_eq!(refusal.to_string(), "mask: at most 255 besides the square, not 256");
 }
