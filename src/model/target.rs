@@ -45,7 +45,7 @@ impl Target {
                 format!("its sides must be 1 to {TARGET_SIDE_MAX_PX} px, not {width_px}x{height_px}"),
             ));
         }
-        check_count((width_px, height_px), pixels.len(), "pixels")?;
+        check_count((width_px, height_px), pixels.len(), ("picture", "pixels"))?;
         Ok(Self { width_px, height_px, pixels, weights: None, transparent: None })
     }
 
@@ -57,7 +57,7 @@ impl Target {
     /// # Errors
     /// [`Error::Parameter`] if their count does not fit the size, or if one is out of range.
     pub fn with_weights(mut self, mut weights: Vec<u8>) -> Result<Self> {
-        check_count((self.width_px, self.height_px), weights.len(), "weights")?;
+        check_count((self.width_px, self.height_px), weights.len(), ("weights", "weights"))?;
         if let Some(wrong) = weights.iter().find(|weight| !(1..=WEIGHT_MAX).contains(*weight)) {
             return Err(Error::parameter("weights", format!("each must be 1 to {WEIGHT_MAX}, not {wrong}")));
         }
@@ -72,7 +72,11 @@ impl Target {
     /// # Errors
     /// [`Error::Parameter`] if their count does not fit the size.
     pub fn with_transparent(mut self, transparent: Vec<bool>) -> Result<Self> {
-        check_count((self.width_px, self.height_px), transparent.len(), "transparent")?;
+        check_count(
+            (self.width_px, self.height_px),
+            transparent.len(),
+            ("transparent", "pixels that are transparent or not"),
+        )?;
         self.transparent = Some(transparent).filter(|transparent| transparent.contains(&true));
         Ok(self)
     }
@@ -109,11 +113,11 @@ impl Target {
     }
 }
 
-fn check_count((width_px, height_px): (u32, u32), count: usize, name: &str) -> Result<()> {
+fn check_count((width_px, height_px): (u32, u32), count: usize, (name, what): (&str, &str)) -> Result<()> {
     if count == width_px as usize * height_px as usize {
         return Ok(());
     }
-    Err(Error::parameter(name, format!("a picture of {width_px}x{height_px} px cannot have {count}")))
+    Err(Error::parameter(name, format!("a picture of {width_px}x{height_px} px cannot have {count} {what}")))
 }
 
 fn greatest_common_divisor(a: u8, b: u8) -> u8 {
