@@ -134,5 +134,5 @@ fn request(text: &str) -> Result<DeviceRequest> {
         );
         return Err(Error::NoSuitableDevice { why: NoDevice::Other(why) });
     }
-    text.parse()
+    text.parse().map_err(|_| Error::Usage(format!("--device {text}: expected {}", DeviceRequest::FORMS)))
 }

@@ -27,14 +27,16 @@ pub enum DeviceRequest {
     Name(String),
 }
 
+impl DeviceRequest {
+    /// The forms in which a device is asked for, for people.
+    pub const FORMS: &str = "auto, cpu, vulkan, a number, uuid:HEX, pci:0000:65:00.0 or name:PART";
+}
+
 impl FromStr for DeviceRequest {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let wrong = || {
-            let forms = "auto, cpu, vulkan, a number, uuid:HEX, pci:0000:65:00.0 or name:PART";
-            Error::parameter("device", format!("expected {forms}, not `{text}`"))
-        };
+        let wrong = || Error::parameter("device", format!("expected {}, not `{text}`", Self::FORMS));
         let lower = text.trim().to_lowercase();
         match lower.as_str() {
             "auto" => return Ok(Self::Auto),
