@@ -1,9 +1,10 @@
-//! What each rule of the `cells` search is worth: pictures of 256 px, 2,500 tiles and 400,000 evals on the CPU twin, with
-//! one rule switched off at a time.
+//! What each rule of the `cells` search is worth: pictures of 256 px, 2,500 tiles and 400,000 evals on the CPU twin,
+//! with one rule switched off at a time.
 //!
-//! `cargo bench --bench ablation -- [FOLDER] [--evals E] [--seeds S]`: of FOLDER the five development pictures that are in
-//! it, else the photo that ships with the tests. Prints a table: the mean error per channel of each picture, their geometric
-//! mean over the photos (drawings may end without any error, and have no place in it), and the mean time of a search.
+//! `cargo bench --bench ablation -- [FOLDER] [--evals E] [--seeds S]`: searches the five development pictures in
+//! FOLDER, or, without FOLDER, the photo that ships with the tests. Prints a table with the mean error per channel of
+//! each picture, the geometric mean of these errors over the photos, and the mean time of a search. Drawings are left
+//! out of the geometric mean, since they may end without any error.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
@@ -16,7 +17,6 @@ use std::time::Instant;
 use clap::Parser;
 use smalti::cpu::cells::CpuSearch;
 use smalti::evolve::evolution::random_population;
-use smalti::evolve::style::Style;
 use smalti::model::Target;
 use smalti::model::cells::rules::{Acceptance, BirthDepth, BirthKind, ColorSource};
 use smalti::model::cells::{Rules, Search};
@@ -65,7 +65,7 @@ const VARIANTS: [Variant; 12] = [
 /// The mean error per channel and the seconds of one search.
 fn search(target: &Arc<Target>, (change, seed): (fn(&mut Rules), u64), evals: u64) -> (f64, f64) {
     let began = Instant::now();
-    let mut course = common::cells::course(target, &Style::free(), FLY_COUNT, 1);
+    let mut course = common::cells::course(target, "free", FLY_COUNT, 1);
     course.rules.seed = seed;
     change(&mut course.rules);
     let needs_parents = course.rules.births.kind == BirthKind::Mutant;

@@ -1,8 +1,8 @@
 //! Cells searches of 256x256 px with 2,500 tiles on a Vulkan device: 16 one by one, and as lanes that share its
 //! dispatches.
 //!
-//! `cargo bench --bench cells_lanes -- [--lanes L] [--evals E] [--candidates K,..]`; evals are those of each search. Prints evals per
-//! second, the best of three runs each, in turn.
+//! `cargo bench --bench cells_lanes -- [--lanes L] [--evals E] [--candidates K,..]`; `--evals` is the budget of each
+//! search. Prints evals per second: the best of three runs, which take turns.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
@@ -11,9 +11,8 @@ mod common;
 use std::time::Instant;
 
 use clap::Parser;
-use smalti::engine::SearchCrew;
+use smalti::engine::{Crew, SearchTask, Task};
 use smalti::evolve::cells::Budget;
-use smalti::evolve::style::Style;
 use smalti::gpu::VulkanLanes;
 use smalti::model::cells::Course;
 use smalti::vk::Timing;
@@ -35,27 +34,25 @@ struct Arguments {
 }
 
 /// Evals per second of searches of which so many are at work at once, each from nothing to the end of its budget.
-fn speed(mut lanes: SearchCrew, course: &Course, (at_once, count): (usize, u64), evals: u64) -> f64 {
+fn speed(mut crew: Crew, course: &Course, (at_once, count): (usize, u64), evals: u64) -> f64 {
     let budget = Budget { evals, target_sae: None, patience: None };
     let mut course = course.clone();
     let mut tickets = 0..count;
     let mut made = 0;
     let begun = Instant::now();
     loop {
-        while lanes.len() < at_once
+        while crew.len() < at_once
             && let Some(ticket) = tickets.next()
         {
             course.rules.seed = ticket;
-            assert!(
-                lanes.admit(ticket, course.clone(), (None, budget)).expect("it fits"),
-                "no room for {ticket} lanes"
-            );
+            let task = Task::Search(SearchTask { course: course.clone(), first: None, budget });
+            assert!(crew.admit(ticket, task).expect("it fits"), "no room for {ticket} lanes");
         }
-        if lanes.is_empty() {
+        if crew.is_empty() {
             return made as f64 / begun.elapsed().as_secs_f64();
         }
-        for finished in lanes.step().expect("the device works") {
-            made += finished.outcome.expect("no search fails").standing.evals;
+        for finished in crew.step().expect("the device works") {
+            made += finished.outcome.expect("no search fails").ending.evals();
         }
     }
 }
@@ -65,10 +62,10 @@ fn main() {
     let Arguments { lanes: lane_count, evals, candidates, .. } = Arguments::parse();
     let target = common::target(256, 256);
     for candidates in candidates {
-        let course = common::cells::course(&target, &Style::free(), 2_500, candidates);
+        let course = common::cells::course(&target, "free", 2_500, candidates);
         let run = |at_once, (count, evals)| {
             let lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
-            speed(SearchCrew::new(Box::new(lanes)), &course, (at_once, count), evals)
+            speed(Crew::default().with_searches(Box::new(lanes)), &course, (at_once, count), evals)
         };
         // Shaders are compiled at their first use.
         run(2, (2, 1_000));

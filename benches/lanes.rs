@@ -1,12 +1,12 @@
-//! Two pictures of 512x512 px with 5,000 flies and 40,000 births each, one by one, on the CPU: as lanes of one engine, and
-//! an engine each side by side; beside one picture alone.
+//! Two pictures of 512x512 px on the CPU, with 5,000 flies and 40,000 births each, one birth per generation: as lanes
+//! of one engine, and in two engines side by side. One picture alone is the baseline.
 
 mod common;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use smalti::cpu::CpuEvaluator;
-use smalti::engine::{Engine, Undisturbed, side_by_side};
-use smalti::evolve::{Evolution, PaperScheme};
+use smalti::engine::{Engine, side_by_side};
+use smalti::evolve::{Evolution, PaperScheme, Undisturbed};
 use smalti::model::{Fly, Scene};
 
 /// Evolves `lane_count` pictures in one engine.

@@ -4,12 +4,12 @@
 mod common;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use smalti::Result;
 use smalti::cpu::CpuEvaluator;
-use smalti::engine::{Engine, Undisturbed};
-use smalti::error::Result;
-use smalti::evolve::{Evolution, PaperScheme};
+use smalti::engine::Engine;
+use smalti::evolve::{Evolution, PaperScheme, Undisturbed};
 use smalti::gpu::GpuEvaluator;
-use smalti::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
+use smalti::model::{Change, Evaluation, Evaluator, Fly, Lane, Layers, Scene};
 
 /// An evaluator that evaluates the whole picture after every generation: what incremental refresh is compared with.
 struct FullRefresh {
@@ -45,9 +45,6 @@ impl Evaluator for FullRefresh {
     }
     fn read_back_layers(&mut self, lane: usize) -> Result<Layers> {
         self.inner.read_back_layers(lane)
-    }
-    fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
-        self.inner.draw(population, canvas, supersampling)
     }
 }
 

@@ -1,5 +1,5 @@
-//! What translucency costs: full evaluations of the same flies as plain squares, under an opaque mask, and under the same
-//! mask as translucent, of half the opacity on average, at mean depths of 4, 8 and 16.
+//! What translucency costs: full evaluations of the same flies as plain squares, under an opaque mask, and under the
+//! same mask read as translucent, with half the opacity on average. Mean depths are 4, 8 and 16.
 
 mod common;
 

@@ -1,35 +1,19 @@
-// The steps of the cells of one round: selection, mutation, evaluation, acceptance, removal. A workgroup is a cell. Twin:
-// src/cpu/cells/cell.rs.
+// The steps of the cells of one round among opaque tiles: what shared/cells_loop.glsl needs of their pixels. A
+// workgroup is a cell. Twin: src/cpu/cells/opaque.rs.
 //
-// Candidate k is made by invocation k; then all invocations work on its pixels together. Software Vulkan ends all loops of an
-// invocation after 65,535 turns, so that turns are counted and a cell stops before a step that might not fit its budget; the next
-// dispatch goes on there. Until a child is accepted nothing is written, so an abandoned step leaves no trace.
+// The word beside a fly in a stack is its error there. In the scratch lies the target; of dressed tiles first the
+// colour that would show it and the weight less 1, then target and shade.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 
-layout(local_size_x_id = 0) in;
-// 1: the workgroup has several subgroups.
-layout(constant_id = 1) const uint WIDE = 1u;
-// 0 median, 1 mean, 2 pick, 3 evolved.
-layout(constant_id = 2) const uint COLOR_SOURCE = 0u;
-// 1: births are mutated copies.
-layout(constant_id = 3) const uint MUTANTS = 0u;
-// 1: births lie anywhere in depth.
-layout(constant_id = 4) const uint RANDOM_DEPTH = 0u;
-layout(constant_id = 5) const uint TURN_PENALTY = 1u;
-layout(constant_id = 6) const uint LOCAL_SIZE = 1u;
-// 1: tiles wear masks or grout, or pixels do not all count the same.
-layout(constant_id = 7) const uint DRESSED = 1u;
-
-const uint LANES = gl_WorkGroupSize.x;
-
-#define MASK_BINDING 12
+#include "shared/cells_stage.glsl"
 #include "shared/tile.glsl"
 #include "shared/mask.glsl"
 #include "shared/cells_random.glsl"
+#include "shared/cells_rules.glsl"
 #include "shared/cells_state.glsl"
 #include "shared/cells_footprint.glsl"
 #include "shared/cells_grid.glsl"
@@ -37,17 +21,7 @@ const uint LANES = gl_WorkGroupSize.x;
 #include "shared/cells_suit.glsl"
 #include "shared/cells_patches.glsl"
 
-layout(std430, binding = 7) coherent buffer StepsBuffer { uint steps[]; };
-// Marginal fitness. Of a cell's own flies it is written by the cell alone; to that of frozen flies all only add.
-layout(std430, binding = 8) coherent buffer FitnessBuffer { int fitness[]; };
-layout(std430, binding = 9) readonly buffer GuideBuffer { uvec2 guide[]; };
-// Per pixel 16 flies, nearest first, and their errors; in each block of 8x8 first the nearest of all pixels.
-layout(std430, binding = 10) coherent buffer StacksBuffer { uvec2 stacks[]; };
-// Per cell the pixels where a child shows its colour, a column for each invocation: the target; of dressed tiles the colour that
-// would show it and the weight less 1, then target and shade.
-layout(std430, binding = 11) coherent buffer ScratchBuffer { uint scratch[]; };
-
-// Where a pixel's nearest fly lies among the stacks; the next ones follow, one block of pixels apart.
+// Where a pixel's nearest fly lies among the stacks.
 uint stack_first(uint place) {
     return rule.first_stack + place / 64u * (STACK_DEPTH * 64u) + place % 64u;
 }
@@ -64,7 +38,8 @@ int without_victim(uint index, Fly victim) {
 
 // What a child would do to the pixels of its box.
 struct Seen {
-    // What its pixels add to the change of the objective; where its colour is to be found, without the errors of its colour.
+    // What its pixels add to the change of the objective; where its colour is to be found, without the errors of its
+    // colour.
     int change;
     // Weight of the pixels in the scratch, and how many of them are this invocation's.
     uint weight;
@@ -92,7 +67,8 @@ int scratch_weight(uint word) {
     return DRESSED == 0u ? 1 : int(word >> 24) + 1;
 }
 
-// Looks at the pixels of a child. Its colour may be still to be found: then the pixels that show it are put in the scratch.
+// Looks at the pixels of a child. Its colour may be still to be found: then the pixels that show it are put in the
+// scratch.
 Seen look(Fly child, uint index, Footprint footprint, bool has_color) {
     uint color = fly_color(child);
     Tile suit = suit_of(child);
@@ -117,7 +93,7 @@ Seen look(Fly child, uint index, Footprint footprint, bool has_color) {
                     shown = pixels[place + 1u].xyz;
                 }
                 crowded |= top.x >> 24 == STACK_DEPTH ? 1u : 0u;
-                change += int(rule.overlap);
+                change += int(rule.penalties.overlap);
                 if (child.z < shown.y || child.z == shown.y && index < shown.x) {
                     Want want = want_of(top.z);
                     shows = 1u;
@@ -199,14 +175,6 @@ uint found_color(Fly child, Seen seen) {
     return color;
 }
 
-// The best child so far; the same in all invocations.
-struct Best {
-    Candidate candidate;
-    int change;
-    bool is_crowded;
-};
-
-// Evaluates a candidate; it takes the best one's place if it is better. False if it is invalid after all.
 bool evaluate(Candidate candidate, inout Best best) {
     Footprint footprint = footprint_of(candidate.fly, grid.size);
     if (!afford(CANDIDATE_TURNS + patch_turns(footprint.box, 0u))) {
@@ -222,25 +190,14 @@ bool evaluate(Candidate candidate, inout Best best) {
         }
         uint color = found_color(candidate.fly, seen);
         change += scratch_error(color, seen.own_count);
-        // A colour of 16 bits stays as it is where it is the same in 8.
-        if (color != fly_color(candidate.fly)) {
-            set_color(candidate.fly, color);
-        }
+        set_color(candidate.fly, color);
         if (!seen.is_shown && candidate.paint == PAINT_BIRTH) {
             return false;
         }
     }
-    if (candidate.is_same && candidate.fly.rg == candidate.old_rg && candidate.fly.ba == candidate.old_ba) {
-        return false;
-    }
-    change += candidate.own;
-    if (!best.candidate.is_valid || change < best.change) {
-        best = Best(candidate, change, seen.is_crowded);
-    }
-    return true;
+    return offer(candidate, change, seen.is_crowded, best);
 }
 
-// Whether no pixel's stack would become too deep.
 bool has_room(Best best) {
     if (!best.is_crowded) {
         return true;
@@ -272,8 +229,13 @@ bool has_room(Best best) {
     return sum_all(ivec4(refused, 0, 0, 0)).x == 0;
 }
 
-// A fly's change of place, depth or colour; the same in all invocations.
-struct Exchange {
+bool is_useless(uint index, Fly fly, int fly_fitness, out int change) {
+    change = fly_fitness;
+    return is_alive(fly) && fly_fitness <= 0;
+}
+
+// A tile in the place of another one's; one of them may be absent. The same in all invocations.
+struct Swap {
     uint fly;
     uint z;
     uint color;
@@ -281,9 +243,29 @@ struct Exchange {
     Footprint new;
     Tile old_suit;
     Tile new_suit;
+    // To go through.
+    ivec4 boxes[2];
     // Neither depth nor colour changes; of a dressed tile both may, from pixel to pixel.
     bool is_kept;
 };
+
+Swap swap_of(uint index, Fly old, Fly child) {
+    Swap swap;
+    swap.fly = index;
+    swap.z = child.z;
+    swap.color = fly_color(child);
+    swap.old = footprint_of(old, grid.size);
+    swap.new = footprint_of(child, grid.size);
+    swap.old_suit = suit_of(old);
+    swap.new_suit = suit_of(child);
+    union_boxes(swap.old.box, swap.new.box, swap.boxes);
+    swap.is_kept = DRESSED == 0u && old.z == child.z && fly_color(old) == swap.color;
+    return swap;
+}
+
+uint exchange_turns(Swap swap) {
+    return boxes_turns(swap.boxes, STACK_DEPTH + 1u);
+}
 
 void add_fitness(uint fly, int amount) {
     if (fly != NO_FLY && amount != 0) {
@@ -291,20 +273,21 @@ void add_fitness(uint fly, int amount) {
     }
 }
 
-uint depth_of(uint fly, Exchange change) {
+uint depth_of(uint fly, Swap swap) {
     if (fly == NO_FLY) {
         return BACKGROUND_Z;
     }
-    return fly == change.fly ? change.z : flies[rule.first_fly + fly].z;
+    return fly == swap.fly ? swap.z : flies[rule.first_fly + fly].z;
 }
 
-// Takes the fly off a pixel's stack if it was there, and puts it there if it is seen there now. Returns the turns of its loop.
-uint exchange_pixel(Exchange change, uint place, uint look) {
+// Takes the fly off a pixel's stack if it was there, and puts it there if it is seen there now. Returns the turns of
+// its loop.
+uint exchange_pixel(Swap swap, uint place, uint look) {
     uvec4 top = pixels[2u * place];
     uvec4 under = pixels[2u * place + 1u];
     uint depth = top.x >> 24;
     uint first = stack_first(place);
-    uvec2 own = uvec2(change.fly, uint(look_error(look, change.color, top.x, want_of(top.z))));
+    uvec2 own = uvec2(swap.fly, uint(look_error(look, swap.color, top.x, want_of(top.z))));
     uvec2 ground = uvec2(NO_FLY, under.w);
     uvec2 nearest = ground;
     uvec2 second = ground;
@@ -315,12 +298,12 @@ uint exchange_pixel(Exchange change, uint place, uint look) {
     for (uint entry = 0u; entry < depth; ++entry) {
         uvec2 current = next;
         next = stacks[first + min(entry + 1u, STACK_DEPTH - 1u) * 64u];
-        if (current.x == change.fly) {
+        if (current.x == swap.fly) {
             changed = min(changed, entry);
             continue;
         }
         uint z = flies[rule.first_fly + current.x].z;
-        if (is_pending && (change.z < z || change.z == z && change.fly < current.x)) {
+        if (is_pending && (swap.z < z || swap.z == z && swap.fly < current.x)) {
             stacks[first + count * 64u] = own;
             changed = min(changed, count);
             nearest = count == 0u ? own : nearest;
@@ -346,179 +329,52 @@ uint exchange_pixel(Exchange change, uint place, uint look) {
     if (changed < 2u) {
         add_fitness(top.y, int(top.w) - int(under.z));
         add_fitness(nearest.x, int(second.y) - int(nearest.y));
-        pixels[2u * place] = uvec4(target, nearest.x, depth_of(nearest.x, change) | top.z - top_z(top.z), nearest.y);
-        pixels[2u * place + 1u] = uvec4(second.x, depth_of(second.x, change), second.y, under.w);
+        pixels[2u * place] = uvec4(target, nearest.x, depth_of(nearest.x, swap) | top.z - top_z(top.z), nearest.y);
+        pixels[2u * place + 1u] = uvec4(second.x, depth_of(second.x, swap), second.y, under.w);
     } else {
         pixels[2u * place].x = target;
     }
     return depth;
 }
 
-// Takes the fly off the pixels of its old footprint and puts it on those of its new one.
-void exchange(Exchange change, ivec4 boxes[2]) {
+void exchange(Swap swap) {
     ivec2 offset = lane_offset();
     int covered = 0;
     uint inner_turns = 0u;
     for (uint which = 0u; which < 2u; ++which) {
-        ivec4 box = which == 0u ? boxes[0] : boxes[1];
+        ivec4 box = which == 0u ? swap.boxes[0] : swap.boxes[1];
         for (int y = box.y; y <= box.w; y += PATCH_HEIGHT) {
             for (int x = first_column(box); x <= box.z; x += PATCH_WIDTH) {
                 ivec2 pixel = ivec2(x, y) + offset;
                 // Boxes that are apart may share a patch.
                 bool is_in_box = all(greaterThanEqual(pixel, box.xy)) && all(lessThanEqual(pixel, box.zw));
-                bool was = is_in_box && look_of(change.old, change.old_suit, pixel) != LOOK_HOLE;
-                uint look = look_of(change.new, change.new_suit, pixel);
+                bool was = is_in_box && look_of(swap.old, swap.old_suit, pixel) != LOOK_HOLE;
+                uint look = look_of(swap.new, swap.new_suit, pixel);
                 bool is = is_in_box && look != LOOK_HOLE;
                 uint depth = 0u;
-                if ((was || is) && !(was && is && change.is_kept)) {
+                if ((was || is) && !(was && is && swap.is_kept)) {
                     covered += (is ? 1 : 0) - (was ? 1 : 0);
-                    depth = exchange_pixel(change, pixel_place(uvec2(pixel)), look);
+                    depth = exchange_pixel(swap, pixel_place(uvec2(pixel)), look);
                 }
                 inner_turns += subgroupMax(depth) + 1u;
             }
         }
     }
-    turns += max_all(inner_turns) + patch_turns(boxes[0], 0u) + patch_turns(boxes[1], 0u);
+    turns += max_all(inner_turns) + boxes_turns(swap.boxes, 0u);
     covered = subgroupAdd(covered);
     if (subgroupElect()) {
-        add_fitness(change.fly, -covered * int(rule.overlap));
+        add_fitness(swap.fly, -covered * int(rule.penalties.overlap));
     }
 }
 
-void main() {
-    take_lane();
-    cell_number = work_number();
-    uint round = header[rule.lane].round;
-    grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
-    if (header[rule.lane].pending == 0u || cell_number >= grid.columns * grid.rows) {
-        return;
-    }
-    cell = cells[rule.first_cell + cell_number];
-    if (cell.step == STEP_DONE) {
-        return;
-    }
-    // All read the step before one writes it.
-    sync();
-    uint chain = chain_then(chain_new(search_seed(), round, DRAW_STEP), cell_number);
-    uint lane = gl_LocalInvocationID.x;
-    uint candidates = rule.candidates;
-    uint batches = (candidates + BATCH - 1u) / BATCH;
-    uint step_count = cell.count * rule.steps_per_fly;
-    uint end = step_count + cell.count;
-    uint step = cell.step;
-    turns = STEP_TURNS;
-    is_over = false;
-    uvec2 evals = uvec2(0u);
-    uvec2 births = uvec2(0u);
-    uvec2 accepted = uvec2(0u);
-    uvec2 change_sum = uvec2(0u);
-    while (step < end) {
-        bool is_removal = step >= step_count;
-        uint tournaments = rule.place_tournament + rule.victim_tournament;
-        uint making = STEP_TURNS + (is_removal ? 0u : batches * (BATCH_TURNS + tournaments));
-        if (!afford(making)) {
-            break;
-        }
-        uint draws = chain_then(chain, step);
-        uint place = is_removal ? step - step_count : chain_below(draws, 0u, cell.count);
-        uint index = member(place);
-        Fly fly = flies[rule.first_fly + index];
-        int place_fitness = fitness[rule.first_fly + index];
-        Best best;
-        best.candidate.is_valid = false;
-        best.change = 0;
-        best.is_crowded = false;
-        uint step_evals = 0u;
-        bool was_changed = false;
-        for (uint first = 0u; first < (is_removal || is_over ? 0u : candidates); first += BATCH) {
-            if (lane < BATCH) {
-                Candidate made =
-                    make_candidate(place, index, fly, place_fitness, chain_then(draws, first + lane + 1u));
-                store_candidate(lane, made);
-            }
-            sync();
-            for (uint slot = 0u; slot < min(BATCH, candidates - first); ++slot) {
-                Candidate candidate = load_candidate(slot);
-                if (candidate.is_valid && !is_over && evaluate(candidate, best)) {
-                    ++step_evals;
-                    was_changed = was_changed || candidate.paint != PAINT_BIRTH;
-                }
-            }
-            sync();
-        }
-        bool is_accepted = false;
-        if (best.candidate.is_valid && best.change <= rule.highest && !is_over) {
-            is_accepted = has_room(best);
-        }
-        if (is_removal) {
-            is_accepted = is_alive(fly) && place_fitness <= 0;
-            best.candidate.index = index;
-            best.candidate.paint = PAINT_KEEP;
-            best.candidate.fly = Fly(0, 0, uint(Z_MAX), 0u, 0u, 16u, 16u, 0u);
-            best.change = place_fitness;
-        }
-        uint changed = best.candidate.index;
-        Fly old = fly;
-        Exchange change;
-        ivec4 boxes[2];
-        if (is_accepted) {
-            old = flies[rule.first_fly + changed];
-            Fly child = best.candidate.fly;
-            uint color = fly_color(child);
-            bool is_kept = DRESSED == 0u && old.z == child.z && fly_color(old) == color;
-            change = Exchange(
-                changed, child.z, color, footprint_of(old, grid.size), footprint_of(child, grid.size), suit_of(old),
-                suit_of(child), is_kept
-            );
-            union_boxes(change.old.box, change.new.box, boxes);
-            uint most = patch_turns(boxes[0], STACK_DEPTH + 1u) + patch_turns(boxes[1], STACK_DEPTH + 1u);
-            is_over = is_over || turns + most > push.budget;
-        }
-        if (is_over) {
-            break;
-        }
-        // All have read fitness, pixels and flies before any is changed.
-        sync();
-        if (is_accepted) {
-            exchange(change, boxes);
-            add_wide(change_sum, best.change);
-        }
-        sync();
-        if (lane == 0u) {
-            if (is_accepted) {
-                Fly child = best.candidate.fly;
-                bool is_birth = best.candidate.paint == PAINT_BIRTH;
-                flies[rule.first_fly + changed] = child;
-                steps[rule.first_fly + changed] = is_birth || is_removal ? STEP_FIRST : grown(steps[rule.first_fly + changed]);
-                if (LEASHED == 1u && is_birth) {
-                    origins[rule.first_origin + changed].form = 0u;
-                }
-                if (is_removal) {
-                    fitness[rule.first_fly + changed] = 0;
-                } else if (TURN_PENALTY == 1u) {
-                    int before = is_alive(old) ? turn_penalty(old, local_at(old)) : 0;
-                    add_fitness(changed, before - turn_penalty(child, local_at(child)));
-                }
-            } else if (was_changed) {
-                steps[rule.first_fly + index] = shrunk(steps[rule.first_fly + index]);
-            }
-        }
-        if (is_accepted && !is_removal) {
-            births.x += best.candidate.paint == PAINT_BIRTH ? 1u : 0u;
-            ++accepted.x;
-        }
-        evals.x += step_evals;
-        ++step;
-        sync();
-    }
-    if (lane == 0u) {
-        if (step == cell.step) {
-            atomicMax(header[rule.lane].overrun, cell_number + 1u);
-        }
-        cells[rule.first_cell + cell_number].step = step == end ? STEP_DONE : step;
-        add_to_header(evals, births, accepted, change_sum);
-        if (step == end && atomicAdd(header[rule.lane].pending, 0xFFFFFFFFu) == 1u) {
-            atomicAdd(header[rule.lane].round, 1u);
-        }
+void settle_fitness(uint index, Fly old, Fly child, int change) {
+    if (TURN_PENALTY == 1u) {
+        int before = is_alive(old) ? turn_penalty(old, local_at(old)) : 0;
+        add_fitness(index, before - turn_penalty(child, local_at(child)));
     }
 }
+
+// Marginal fitness is up to date already.
+void end_round() {}
+
+#include "shared/cells_loop.glsl"

@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 #include "shared/cells_random.glsl"
+#include "shared/cells_rules.glsl"
 #include "shared/cells_state.glsl"
 #include "shared/cells_footprint.glsl"
 #include "shared/cells_grid.glsl"
@@ -12,10 +13,10 @@ layout(local_size_x = 64) in;
 
 uint first_round(uint fly) {
     uint count = rule.class_count;
-    uint round = rule.first_round_3;
-    round = count <= 3u || fly < rule.end_2 ? rule.first_round_2 : round;
-    round = count <= 2u || fly < rule.end_1 ? rule.first_round_1 : round;
-    return count <= 1u || fly < rule.end_0 ? rule.first_round_0 : round;
+    uint round = rule.classes[3].first_round;
+    round = count <= 3u || fly < rule.classes[2].end ? rule.classes[2].first_round : round;
+    round = count <= 2u || fly < rule.classes[1].end ? rule.classes[1].first_round : round;
+    return count <= 1u || fly < rule.classes[0].end ? rule.classes[0].first_round : round;
 }
 
 // The cell of the worst of some random pixels.

@@ -1,8 +1,9 @@
-// Gives the layers of each pixel the depths of their flies, which were spread anew; one invocation is one pixel. Twin: `renormalise` in
-// src/cpu/cells/mod.rs.
+// Gives the layers of each pixel the depths of their flies, which were spread anew; one invocation is one pixel. Twin:
+// `renormalise` in src/cpu/cells/mod.rs.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 
+#include "shared/cells_rules.glsl"
 #include "shared/cells_state.glsl"
 
 layout(local_size_x = 64) in;

@@ -1,5 +1,5 @@
-// Marginal fitness of translucent tiles when a round is over: first what flies cost, then by how much each pixel's error rises without
-// each of its tiles. Twin: `refresh` in src/cpu/cells/translucent.rs.
+// Marginal fitness of translucent tiles when a round is over: first what flies cost, then by how much each pixel's
+// error rises without each of its tiles. Twin: `refresh` in src/cpu/cells/translucent.rs.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
@@ -17,6 +17,7 @@ const uint RANDOM_DEPTH = 0u;
 #include "shared/mask.glsl"
 #include "shared/translucency.glsl"
 #include "shared/cells_random.glsl"
+#include "shared/cells_rules.glsl"
 #include "shared/cells_state.glsl"
 #include "shared/cells_footprint.glsl"
 #include "shared/cells_pixel.glsl"

@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 #include "shared/cells_random.glsl"
+#include "shared/cells_rules.glsl"
 #include "shared/cells_state.glsl"
 #include "shared/cells_footprint.glsl"
 #include "shared/cells_grid.glsl"

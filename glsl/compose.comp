@@ -1,6 +1,6 @@
-// Colours of a patch of translucent tiles, at any size: the rule of the fitness, which fixed-function blending, with its
-// own rounding, would not keep. One workgroup is one block of samples, one invocation a column of SAMPLES_PER_THREAD in
-// it. Twin: src/cpu/mosaic.rs.
+// Colours of a patch of translucent tiles, at any size: the rule of the fitness, which fixed-function blending, with
+// its own rounding, would not keep. One workgroup is one block of samples, one invocation a column of
+// SAMPLES_PER_THREAD in it. Twin: src/cpu/mosaic.rs.
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require

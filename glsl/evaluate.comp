@@ -14,31 +14,11 @@
 #include "shared/error.glsl"
 #include "shared/lane.glsl"
 #include "shared/mask.glsl"
+#include "shared/block.glsl"
 
-layout(local_size_x_id = 0) in;
-layout(constant_id = 1) const uint BLOCK_SIDE = 8u;
-layout(constant_id = 2) const uint PIXELS_PER_THREAD = 8u;
-// 1: some tiles wear a mask other than the square. Software Vulkan runs both sides of a branch, so the look-ups must not
-// even be there when no tile needs them.
-layout(constant_id = 4) const uint MASKED = 1u;
-// 1: sums may not fit 32 bits, so carries go to the high word.
-layout(constant_id = 5) const uint WIDE_SUMS = 1u;
-// 1: some lists are looked at in pieces, so that layers are taken over from an earlier dispatch. Software Vulkan would load
-// them for nothing.
+// 1: some lists are looked at in pieces, so that layers are taken over from an earlier dispatch. Software Vulkan would
+// load them for nothing.
 layout(constant_id = 6) const uint PIECES = 1u;
-// 1: only the SAE of the top layer, with one fly left out: a plain re-render, the baseline of the benches.
-layout(constant_id = 3) const uint RE_RENDER = 0u;
-
-struct WorkItem {
-    uint lane;
-    uint first_pixel;
-    int x;
-    int y;
-    uint first_entry;
-    uint entry_count;
-    uint flags;
-    uint padding;
-};
 
 // The block has no old sums to take off.
 const uint FLAG_FRESH = 1u;
@@ -47,24 +27,15 @@ const uint FLAG_CONTINUED = 2u;
 // A later dispatch looks at the rest of the list.
 const uint FLAG_UNFINISHED = 4u;
 
-layout(std430, binding = 0) readonly buffer Lanes { Lane lanes[]; };
-layout(std430, binding = 1) readonly buffer Work { WorkItem items[]; };
-layout(std430, binding = 2) readonly buffer Entries { uint entries[]; };
-layout(std430, binding = 3) readonly buffer Tiles { Tile tiles[]; };
-layout(std430, binding = 4) readonly buffer Targets { uint targets[]; };
 layout(std430, binding = 5) buffer TopLayer { uint top_layer[]; };
 layout(std430, binding = 6) buffer UnderLayer { uint under_layer[]; };
 // Per pixel what it added to the sums: marginal fitness of its top fly << 10 | error.
 layout(std430, binding = 7) buffer Parts { int parts[]; };
 // 64-bit sums as pairs of words, low word first, since 64-bit atomics are not everywhere.
 layout(std430, binding = 8) buffer Marginal { uint marginal[]; };
-layout(std430, binding = 9) buffer Sums { uint sums[]; };
 
 layout(push_constant) uniform Push {
     uint item_count;
-    // Only for RE_RENDER.
-    uint left_out_fly;
-    uint sum_offset;
 } push;
 
 void add_marginal(uint fly, int part) {
@@ -78,19 +49,8 @@ void add_marginal(uint fly, int part) {
     }
 }
 
-void add_sum(uint sum, int part) {
-    if (part == 0) {
-        return;
-    }
-    uint low = atomicAdd(sums[2u * sum], uint(part));
-    int carry = (part >> 31) + (low + uint(part) < low ? 1 : 0);
-    if (WIDE_SUMS == 1u && carry != 0) {
-        atomicAdd(sums[2u * sum + 1u], uint(carry));
-    }
-}
-
-// What is kept of the top and under of a pixel: the fly, and with masks in the lowest byte the shade of its texel. NO_FLY
-// stays what it is.
+// What is kept of the top and under of a pixel: the fly, and with masks in the lowest byte the shade of its texel.
+// NO_FLY stays what it is.
 const uint SHADE_BITS = MASKED * 8u;
 
 uint fly_of(uint shown) {
@@ -139,9 +99,6 @@ void main() {
 
     for (uint entry = item.first_entry; entry < item.first_entry + item.entry_count; ++entry) {
         uint fly = entries[entry];
-        if (RE_RENDER == 1u && fly == push.left_out_fly) {
-            continue;
-        }
         Tile tile = tiles[lane.first_fly + fly];
         uvec2 end = uvec2(tile.w << 12, tile.h << 12);
         uvec2 uv = tile_coordinates(tile, i, j);
@@ -155,17 +112,12 @@ void main() {
                 shown = fly << SHADE_BITS | texel.y;
             }
             bool is_top = covered && top[p] == NO_FLY;
-            if (RE_RENDER == 0u) {
-                bool is_under = covered && !is_top && under[p] == NO_FLY;
-                under[p] = is_under ? shown : under[p];
-                under_color[p] = is_under ? tile.color : under_color[p];
-                open = open || under[p] == NO_FLY;
-            }
+            bool is_under = covered && !is_top && under[p] == NO_FLY;
+            under[p] = is_under ? shown : under[p];
+            under_color[p] = is_under ? tile.color : under_color[p];
+            open = open || under[p] == NO_FLY;
             top[p] = is_top ? shown : top[p];
             top_color[p] = is_top ? tile.color : top_color[p];
-            if (RE_RENDER == 1u) {
-                open = open || top[p] == NO_FLY;
-            }
             uv += uvec2(uint(tile.sin_step), uint(tile.cos_step));
         }
         if (!open) {
@@ -183,11 +135,6 @@ void main() {
         if (MASKED == 1u) {
             top_color[p] = shown_color(lane, top[p]);
             under_color[p] = shown_color(lane, under[p]);
-        }
-        if (RE_RENDER == 1u) {
-            int shown_error = color_error(target, top_color[p]);
-            error_change += inside ? shown_error : 0;
-            continue;
         }
         uint old_top = NO_FLY;
         int old_part = 0;
@@ -219,6 +166,6 @@ void main() {
     }
     int subgroup_change = subgroupAdd(error_change);
     if (subgroupElect()) {
-        add_sum(lane.sum + push.sum_offset, subgroup_change);
+        add_sum(lane.sum, subgroup_change);
     }
 }

@@ -49,8 +49,8 @@ layout(std430, binding = 3) readonly buffer Tiles { Tile tiles[]; };
 layout(std430, binding = 4) readonly buffer Targets { uint targets[]; };
 layout(std430, binding = 5) buffer TopLayer { uint top_layer[]; };
 layout(std430, binding = 6) buffer UnderLayer { uint under_layer[]; };
-// Per item and pixel of its block: number of layers, transmittance, widest transmittance; then rank by rank each pixel's
-// layer, and its slot in the list.
+// Per item and pixel of its block: number of layers, transmittance, widest transmittance; then rank by rank each
+// pixel's layer, and its slot in the list.
 layout(std430, binding = 7) buffer Scratch { uint scratch[]; };
 // Per block the parts of its list's flies, and its error.
 layout(std430, binding = 8) buffer Parts { int parts[]; };

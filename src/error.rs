@@ -10,15 +10,17 @@ use std::path::{Path, PathBuf};
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// A failure. It is displayed as one sentence, without a full stop.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A parameter is outside its range, or does not fit the others.
-    #[error("{name}: {reason}")]
+    /// A parameter is outside its range, or does not fit the others, which the reason names in `backticks`.
+    #[error("{name}{}: {reason}", if value.is_empty() { String::new() } else { format!(" {value}") })]
     Parameter {
         /// The parameter, in snake_case: `grout_width`.
         name: String,
-        /// What it may be, and what it was.
+        /// Its value as text; empty if that does not matter.
+        value: String,
+        /// What it may be, or what it does not fit.
         reason: String,
     },
     /// A name stands for none of the things that are built in.
@@ -168,6 +170,15 @@ pub enum NoDevice {
         /// Name of the device.
         device: String,
     },
+    /// Every hardware GPU was asked for, and there is none.
+    #[error("there is no hardware GPU")]
+    NoGpu,
+    /// Validation was asked for, and the CPU would compute.
+    #[error("validation needs a Vulkan device, and {reason}")]
+    NothingToValidate {
+        /// Why there is no Vulkan device.
+        reason: String,
+    },
     /// Another reason, in the words of whoever needed the device.
     #[error("{0}")]
     Other(String),
@@ -194,9 +205,14 @@ pub enum Remedy {
 }
 
 impl Error {
-    /// An [`Error::Parameter`].
+    /// An [`Error::Parameter`] whose value does not matter.
     pub fn parameter(name: impl Into<String>, reason: impl Into<String>) -> Self {
-        Self::Parameter { name: name.into(), reason: reason.into() }
+        Self::Parameter { name: name.into(), value: String::new(), reason: reason.into() }
+    }
+
+    /// An [`Error::Parameter`] about a value.
+    pub fn value(name: impl Into<String>, value: impl fmt::Display, reason: impl Into<String>) -> Self {
+        Self::Parameter { name: name.into(), value: value.to_string(), reason: reason.into() }
     }
 
     /// An [`Error::Input`] about `path`.

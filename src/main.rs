@@ -2,8 +2,8 @@
 
 use std::process::ExitCode;
 
-use smalti::app::{self, Cli};
+use smalti::cli::{self, Cli};
 
 fn main() -> ExitCode {
-    Cli::from_command_line().map_or_else(|exit_code| exit_code, |cli| app::run(&cli))
+    Cli::from_command_line().map_or_else(|exit_code| exit_code, |cli| cli::run(&cli))
 }

@@ -1,7 +1,7 @@
-//! Populations as OpenRaster files (`.ora`): the mosaic in depth bands, each a layer with alpha, over the background, which a
-//! transparent picture does not have.
+//! Populations as OpenRaster files (`.ora`): the mosaic is cut into bands of depth, each of which is a layer with
+//! alpha. The background is a layer below them, unless it is transparent.
 //!
-//! A band is drawn by an [`Evaluator`] over black and over white; what differs is its transparency. Dates, order and
+//! A [`Painter`] draws each band over black and over white; the difference gives its transparency. Dates, order and
 //! compression are fixed: the same population gives the same bytes. The format: <https://www.openraster.org>.
 
 use std::fs::File;
@@ -13,22 +13,22 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use crate::error::{Error, Result};
 use crate::model::blocks::{depth_order, index_of};
-use crate::model::{Backdrop, Canvas, Evaluator, Fly, Mosaic, Population, Rgb};
+use crate::model::{Backdrop, Canvas, Fly, Mosaic, Painter, Population, Rgb};
 use crate::photo::{self, Format, Metadata, Photo};
 
-/// Depth bands of a file, if nobody asks for another number.
+/// Default number of depth bands.
 pub const BAND_COUNT: usize = 8;
 
 /// The longer side in px of the thumbnail that the format asks for.
 const THUMBNAIL_SIDE_PX: u32 = 256;
 /// Samples along each side of a pixel of the thumbnail.
 const THUMBNAIL_SUPERSAMPLING: u32 = 4;
-/// Member that holds the whole picture, and our metadata as its own.
+/// Member that holds the whole picture, whose metadata is that of the file.
 const MERGED_MEMBER: &str = "mergedimage.png";
-/// Bytes of the whole picture in which its metadata is looked for.
+/// Metadata is searched for in this many bytes of the whole picture.
 const METADATA_BYTES: u64 = 1 << 20;
 
-/// The parts of a file that need drawing, apart from the whole picture.
+/// The parts of a file that have to be drawn, apart from the whole picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers {
     width_px: u32,
@@ -39,16 +39,16 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Draws `population` on `canvas` in `band_count` bands of equally many living flies, or one more; fewer bands if
-    /// there are fewer flies.
+    /// Draws `population` on `canvas` in `band_count` bands, or in fewer if there are fewer living flies. The numbers
+    /// of flies in any two bands differ by at most one.
     ///
-    /// Composed in order they are the whole picture: exactly, for opaque masks and one sample a pixel; else but for
-    /// rounding and for pixels that several bands share.
+    /// Composed in order, the bands give the whole picture. For opaque masks and one sample per pixel this is exact;
+    /// otherwise pixels may differ by rounding, and where several bands share a pixel.
     ///
     /// # Errors
     /// If the device fails.
     pub fn draw(
-        evaluator: &mut dyn Evaluator,
+        painter: &mut dyn Painter,
         population: &Population,
         canvas: &Canvas,
         supersampling: u32,
@@ -71,7 +71,7 @@ impl Layers {
             let mut over = |background: Rgb| {
                 let (background, masks, flies) = (background.into(), population.masks.clone(), flies.clone());
                 let band = Population { background, masks, flies, ..*population };
-                evaluator.draw(&band, canvas, supersampling)
+                painter.draw(&band, canvas, supersampling)
             };
             let (black, white) = (over([0; 3])?, over([255; 3])?);
             let png = photo::encode_png_with_alpha(width_px, height_px, &cut_out(&black, &white), &Metadata::new())?;
@@ -83,15 +83,15 @@ impl Layers {
         let supersampling =
             if thumbnail.width_px.max(thumbnail.height_px) == longest { 1 } else { THUMBNAIL_SUPERSAMPLING };
         let Mosaic { width_px: w, height_px: h, pixels, alpha } =
-            evaluator.draw(population, &thumbnail, supersampling)?;
+            painter.draw(population, &thumbnail, supersampling)?;
         let thumbnail = Photo { width_px: w, height_px: h, pixels };
         let thumbnail = photo::encode_with_alpha(Format::Png, &thumbnail, alpha.as_deref(), &Metadata::new())?;
         Ok(Self { width_px, height_px, layers, thumbnail })
     }
 }
 
-/// The living flies cut into bands, the farthest first. Within a band the nearest comes first, so that flies of one
-/// depth keep their order.
+/// The living flies cut into bands, the farthest band first. Within a band the nearest fly comes first, so flies of
+/// equal depth keep their order.
 fn bands(flies: &[Fly], band_count: usize) -> Vec<Vec<Fly>> {
     let order = depth_order(flies).into_iter().map(|key| flies[index_of(key) as usize]);
     let living: Vec<Fly> = order.filter(|fly| fly.alive).collect();
@@ -109,10 +109,11 @@ fn band_name(number: usize, count: usize) -> String {
     format!("Tiles {number} of {count}{place}")
 }
 
-/// What covers black and white alike, with its opacity; not premultiplied.
+/// The pixels that were drawn over black and over white, without these backgrounds and with their opacity; not
+/// premultiplied.
 fn cut_out(over_black: &Mosaic, over_white: &Mosaic) -> Vec<[u8; 4]> {
     let pixel = |(black, white): (&Rgb, &Rgb)| {
-        // Each channel was rounded by itself, so the three may differ by one.
+        // Each channel was rounded separately, so the three may differ by one.
         let sum: u32 = black.iter().zip(white).map(|(&black, &white)| 255 - u32::from(white.abs_diff(black))).sum();
         let alpha = (sum + 1) / 3;
         let channel = |value: u8| (u32::from(value) * 255 + alpha / 2).checked_div(alpha).unwrap_or(0).min(255) as u8;
@@ -122,7 +123,7 @@ fn cut_out(over_black: &Mosaic, over_white: &Mosaic) -> Vec<[u8; 4]> {
     over_black.pixels.iter().zip(&over_white.pixels).map(pixel).collect()
 }
 
-/// The OpenRaster file of `layers` and of `merged`, the whole picture as a PNG file with our metadata in it.
+/// The OpenRaster file of `layers` and of `merged`, the whole picture as a PNG file that holds the metadata.
 ///
 /// # Errors
 /// [`Error::Encoding`] if the zip file would be larger than its format allows.
@@ -141,7 +142,7 @@ fn write_members(layers: &Layers, merged: &[u8]) -> zip::result::ZipResult<Vec<u
         zip.start_file(name, options)?;
         zip.write_all(bytes).map_err(zip::result::ZipError::from)
     };
-    // First and stored, so that the kind of file shows in its first bytes.
+    // This member comes first and uncompressed, so the first bytes of the file show its format.
     add("mimetype", stored, b"image/openraster")?;
     add("stack.xml", deflated.compression_level(Some(6)), stack(layers).as_bytes())?;
     for (number, (_, png)) in layers.layers.iter().enumerate() {
@@ -173,7 +174,7 @@ fn stack(layers: &Layers) -> String {
     )
 }
 
-/// The metadata of the OpenRaster file at `path`, which is that of its whole picture; empty for anything else.
+/// The metadata of the OpenRaster file at `path`, which is that of its whole picture; empty for any other file.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be opened.

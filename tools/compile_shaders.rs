@@ -1,7 +1,8 @@
-//! Compiles `glsl/` to `spirv/` with shaderc and writes `spirv/MANIFEST`.
+//! Compiles `glsl/` to `spirv/` with shaderc and writes `spirv/MANIFEST`, and before that the part of `glsl/` that
+//! follows from tables in Rust.
 //!
 //! `cargo run --release --features shader-compiler --bin compile-shaders [-- --check]`, from the project's root. With
-//! `--check` nothing is written, and a module that would change is an error. The first build takes about 25 CPU minutes
+//! `--check` nothing is written, and a file that would change is an error. The first build takes about 25 CPU minutes
 //! and needs cmake, a C++ compiler and Python.
 
 #[path = "shader_manifest.rs"]
@@ -25,6 +26,7 @@ fn main() -> ExitCode {
 }
 
 fn compile_all(check: bool) -> Result<(), String> {
+    settle(check, "glsl/shared/cells_rules.glsl", smalti::gpu::cells::layout::search_rules_glsl().as_bytes())?;
     let mut modules = Vec::new();
     for stage in STAGES {
         let source = flattened_source(Path::new("glsl"), stage);

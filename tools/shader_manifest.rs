@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 pub const OPTIONS: &str = "target=vulkan1.3 optimization=none warnings=errors";
 
 /// The shader stages, as named in `glsl/`; the module of `evaluate.comp` is `spirv/evaluate.comp.spv`.
-pub const STAGES: [&str; 13] = [
+pub const STAGES: [&str; 14] = [
     "cells.comp",
     "cells_deal.comp",
     "cells_depths.comp",
@@ -26,6 +26,7 @@ pub const STAGES: [&str; 13] = [
     "evaluate.comp",
     "mosaic.frag",
     "mosaic.vert",
+    "re_render.comp",
     "translucent.comp",
 ];
 

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use smalti::cpu::cells::CpuSearch;
-use smalti::evolve::style::Style;
 use smalti::model::Target;
 use smalti::model::cells::Search;
 
@@ -30,7 +29,7 @@ pub fn measure(gallery: &Gallery, largest_px: u32, report: &mut Report) {
     while side_px <= largest_px {
         let target = repeated(gallery.target("parrots", 256), side_px);
         let fly_count = 2_500 * (side_px as usize / 256).pow(2);
-        let mut search = CpuSearch::new(common::cells::course(&target, &Style::free(), fly_count, 1));
+        let mut search = CpuSearch::new(common::cells::course(&target, "free", fly_count, 1));
         let began = Instant::now();
         search.advance(ROUNDS).expect("the search works");
         let took = began.elapsed();

@@ -1,9 +1,9 @@
-//! Does the `cells` search reach its targets? All figures are those of one seed and of this machine; leave it alone while
-//! it measures.
+//! Does the `cells` search reach its targets? All figures are for one seed and for this machine, which should do
+//! nothing else meanwhile.
 //!
-//! `cargo bench --bench targets -- FOLDER --small FOLDER_256 [--primg PROGRAM] [--primg-outputs FOLDER] [--only PART,..]`
-//! reads star, yin_yang, hats, parrots and woman (.png, 512x512) in FOLDER. The 256x256 pictures that the targets are set
-//! for were made with another Lanczos filter than smalti's; without `--small` smalti reduces them itself.
+//! `cargo bench --bench targets -- FOLDER --small FOLDER_256 [--primg PROGRAM] [--primg-outputs FOLDER] [--only P,..]`
+//! reads star, yin_yang, hats, parrots and woman (.png, 512x512) in FOLDER. The targets were set for 256x256 pictures
+//! that another Lanczos filter made; without `--small`, smalti reduces the pictures itself.
 //!
 //! Parts: `likeness` (SAE of the style `free`), `rivals` (SAE of primg at equal numbers of shapes), `speed`, `mosaic`,
 //! `paint`, and `growth` (cost of an eval from 256 to 4096 px; needs 4 GB).
@@ -27,7 +27,6 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use smalti::cpu::cells::CpuSearch;
-use smalti::evolve::style::Style;
 use smalti::metrics::Difference;
 use smalti::model::Target;
 use smalti::model::cells::Search;
@@ -99,9 +98,9 @@ pub struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Searches on the CPU twin in the current pool, guide included, until the budget is spent or the objective is at most
-    /// `enough`.
-    pub fn search(&self, style: &Style, enough: Option<i64>) -> (CpuSearch, Duration) {
+    /// Searches on the CPU twin in the current pool, guide included, until the budget is spent or the objective is at
+    /// most `enough`.
+    pub fn search(&self, style: &str, enough: Option<i64>) -> (CpuSearch, Duration) {
         let began = Instant::now();
         let course = common::cells::course(self.target, style, self.fly_count, self.candidates);
         let mut search = CpuSearch::new(course);
@@ -111,7 +110,7 @@ impl Task<'_> {
 
     /// The SAE of what the style `free` leads to, counted in the drawn picture.
     pub fn free_sae(&self) -> u64 {
-        let (mut search, _) = self.search(&Style::free(), None);
+        let (mut search, _) = self.search("free", None);
         let sae = drawn_sae(&mut search);
         assert_eq!(i64::try_from(sae), Ok(search.standing().objective), "without penalties the objective is the SAE");
         sae

@@ -1,6 +1,5 @@
 //! Whether the style `mosaic` lays whole, separate tiles along the contours.
 
-use smalti::evolve::style::Style;
 use smalti::model::cells::footprint::Footprint;
 use smalti::model::cells::pixel::difference;
 use smalti::model::cells::suit::{Look, Suit};
@@ -17,7 +16,7 @@ const REACH_PX: i32 = 8;
 pub fn measure(gallery: &Gallery, report: &mut Report) {
     for name in ["woman", "parrots", "hats"] {
         let task = Task { target: gallery.target(name, 512), fly_count: 4_000, candidates: 1, evals: 800_000 };
-        let (mut search, took) = task.search(&Style::mosaic(), None);
+        let (mut search, took) = task.search("mosaic", None);
         let is_set = name == "woman";
         let wanted = |limit: Wanted| if is_set { limit } else { Wanted::Anything };
         report.section(&format!("Style mosaic, {name}, 512 px, N=4000, 800k evals ({:.1} s)", took.as_secs_f64()));
@@ -71,8 +70,8 @@ fn sae_outside_grout(course: &Course, stacks: &Stacks, flies: &[Fly]) -> (u64, u
     (sae, grout)
 }
 
-/// Medians of the angle between tile and field, modulo 90 degrees: over all tiles, over the quarter of them that lies where
-/// the picture is flattest, and over those where the field is not sure of its direction.
+/// Medians of the angle between tile and field, modulo 90 degrees: over all tiles, over the quarter of tiles where the
+/// picture is flattest, and over the tiles where the field is not sure of its direction.
 fn measure_angles(course: &Course, flies: &[Fly], report: &mut Report, wanted: impl Fn(Wanted) -> Wanted) {
     let guide = &course.guide;
     let mut tiles: Vec<(f64, f64, u16)> = living(flies)

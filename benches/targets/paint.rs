@@ -1,6 +1,5 @@
 //! Brush strokes against those of GIMPressionist.
 
-use smalti::evolve::style::Style;
 use smalti::model::cells::Search;
 
 use crate::report::{Report, Wanted};
@@ -19,7 +18,7 @@ pub fn measure(gallery: &Gallery, report: &mut Report) {
     for (name, fly_count, sae) in RIVAL {
         let evals = 400 * fly_count as u64;
         let task = Task { target: gallery.target(name, 256), fly_count, candidates: 1, evals };
-        let (mut search, _) = task.search(&Style::paint(), None);
+        let (mut search, _) = task.search("paint", None);
         let painted = drawn_sae(&mut search);
         let living = search.read_back().expect("the search works").flies.iter().filter(|fly| fly.alive).count();
         report.row(&format!("{name}, N={fly_count}, {living} strokes"), painted as f64, Wanted::AtMost(sae), 0);

@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use smalti::evolve::style::Style;
 use smalti::model::cells::Search;
 
 use crate::report::{Report, Wanted};
@@ -18,7 +17,7 @@ fn timed(task: &Task<'_>, threads: usize, enough: Option<i64>) -> (Duration, u64
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
     let mut runs: Vec<(Duration, u64)> = (0..REPEATS)
         .map(|_| {
-            let (search, took) = pool.install(|| task.search(&Style::free(), enough));
+            let (search, took) = pool.install(|| task.search("free", enough));
             (took, search.standing().evals)
         })
         .collect();

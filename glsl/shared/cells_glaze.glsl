@@ -1,5 +1,5 @@
-// Translucent tiles in the search: what lies on a pixel, and the colour that serves a child best. Twin: src/model/cells/glaze.rs.
-// Needs tile.glsl, mask.glsl, translucency.glsl, cells_suit.glsl.
+// Translucent tiles in the search: what lies on a pixel, and the colour that serves a child best. Twin:
+// src/model/cells/glaze.rs. Needs tile.glsl, mask.glsl, translucency.glsl, cells_suit.glsl.
 
 // Most tiles on a pixel; a multiple of LAYERS_AT_ONCE.
 const uint GLAZED_DEPTH = 24u;

@@ -1,4 +1,5 @@
-// How a child comes from its parent, or from nothing. Twin: src/model/cells/operators.rs; step sizes and own sides: rules.rs.
+// How a child comes from its parent, or from nothing. Twin: src/model/cells/operators.rs; step sizes and own sides:
+// rules.rs. Needs cells_rules.glsl, cells_footprint.glsl.
 
 const uint SLOT_KIND = 0u;
 const uint SLOT_RECOLOR = 1u;
@@ -8,10 +9,9 @@ const uint SLOT_VICTIM = 48u;
 
 const uint MOVE_SIDE_MAX = 138u * 64u;
 const uint SIDE_MIN = 16u;
-const uint SEARCH_SIDE_MAX = 65536u;
-const uint ASPECT_FREE_Q8 = 16384u;
 const int Z_MAX = 16777215;
-const uint STEP_FIRST = 19661u;
+
+const Fly ABSENT = Fly(0, 0, uint(Z_MAX), 0u, 0u, 16u, 16u, 0u);
 
 struct GuideSample {
     uint direction;
@@ -26,12 +26,11 @@ GuideSample guide_at(ivec2 pixel) {
 }
 
 uint own_side(uint fly, GuideSample local) {
-    uint scale = rule.scale_0;
-    scale = rule.class_count > 1u && fly >= rule.end_0 ? rule.scale_1 : scale;
-    scale = rule.class_count > 2u && fly >= rule.end_1 && fly >= rule.end_0 ? rule.scale_2 : scale;
-    scale = rule.class_count > 3u && fly >= rule.end_2 && fly >= rule.end_1 && fly >= rule.end_0
-        ? rule.scale_3
-        : scale;
+    uint count = rule.class_count;
+    uint scale = rule.classes[3].scale_q12;
+    scale = count <= 3u || fly < rule.classes[2].end ? rule.classes[2].scale_q12 : scale;
+    scale = count <= 2u || fly < rule.classes[1].end ? rule.classes[1].scale_q12 : scale;
+    scale = count <= 1u || fly < rule.classes[0].end ? rule.classes[0].scale_q12 : scale;
     uint side = min(rule.side * scale >> 12, SEARCH_SIDE_MAX);
     if (LOCAL_SIZE == 1u) {
         side = min(side * min(local.size_q12, 16384u) >> 12, SEARCH_SIDE_MAX);
@@ -68,13 +67,13 @@ void set_angle(inout Fly fly, uint angle) {
 }
 
 uint longest(uint other, uint low, uint high) {
-    return rule.aspect_max_q8 >= ASPECT_FREE_Q8 ? high : max(other * rule.aspect_max_q8 >> 8, low);
+    return rule.bounds.aspect_max_q8 >= ASPECT_FREE_Q8 ? high : max(other * rule.bounds.aspect_max_q8 >> 8, low);
 }
 
 // `fly` with its sides within the bounds of a fly of this own side.
 void bound_sides(inout Fly fly, uint side) {
-    uint low = clamp(side * rule.side_min_q8 >> 8, SIDE_MIN, SEARCH_SIDE_MAX);
-    uint high = clamp(side * rule.side_max_q8 >> 8, low, SEARCH_SIDE_MAX);
+    uint low = clamp(side * rule.bounds.side_min_q8 >> 8, SIDE_MIN, SEARCH_SIDE_MAX);
+    uint high = clamp(side * rule.bounds.side_max_q8 >> 8, low, SEARCH_SIDE_MAX);
     uint w = clamp(fly.w, low, high);
     uint h = clamp(fly.h, low, high);
     fly.w = min(w, longest(h, low, high));
@@ -158,18 +157,18 @@ Fly repainted(Fly fly, uint step, uint draws) {
 
 // A new tile centred on a pixel.
 Fly newborn(uint side, uvec2 pixel, uint shown_z, GuideSample local, uint draws) {
-    uint range = uint(rule.side_high - rule.side_low + 1);
-    int log_w = rule.side_low + int(chain_below(draws, SLOT_OPERATOR, range));
-    int log_h = rule.side_low + int(chain_below(draws, SLOT_OPERATOR + 1u, range));
-    log_h = clamp(log_h, log_w - rule.aspect_high, log_w + rule.aspect_high);
-    if (rule.is_stroke != 0u) {
+    uint range = uint(rule.births.side_high - rule.births.side_low + 1);
+    int log_w = rule.births.side_low + int(chain_below(draws, SLOT_OPERATOR, range));
+    int log_h = rule.births.side_low + int(chain_below(draws, SLOT_OPERATOR + 1u, range));
+    log_h = clamp(log_h, log_w - rule.births.aspect_high, log_w + rule.births.aspect_high);
+    if (rule.births.is_stroke != 0u) {
         int longer = max(log_w, log_h);
         log_h = min(log_w, log_h);
         log_w = longer;
     }
     uint bits = chain_bits(draws, SLOT_OPERATOR + 2u);
-    bool follows = local.coherence >= below(bits << 16, rule.coherence_range + 1u);
-    int around = int(rule.angle_spread) * bell_q8(draws, SLOT_OPERATOR + 3u) + 128 >> 8;
+    bool follows = local.coherence >= below(bits << 16, rule.births.coherence_range + 1u);
+    int around = int(rule.births.angle_spread) * bell_q8(draws, SLOT_OPERATOR + 3u) + 128 >> 8;
     uint angle = follows ? local.direction + uint(around) : bits >> 16;
     bits = chain_bits(draws, SLOT_OPERATOR + 4u);
     uint gap = 1u + below(bits, rule.depth_gap);
@@ -197,15 +196,15 @@ int turn_penalty(Fly fly, GuideSample local) {
     uint deviation = (fly_angle(fly) - local.direction + 8192u & 16383u) - 8192u;
     uint squared = deviation * deviation >> 18;
     uint area = min((fly.w >> 4) * (fly.h >> 4), (1u << 24) - 1u);
-    return int((area * squared >> 12) * rule.turn_penalty);
+    return int((area * squared >> 12) * rule.penalties.turn);
 }
 
 uint grown(uint step) {
-    return min(step * 358u >> 8, 65536u);
+    return min(step * STEP_GROWTH_Q8 >> 8, STEP_MAX);
 }
 
 uint shrunk(uint step) {
-    return max(step * 235u >> 8, 655u);
+    return max(step * STEP_SHRINK_Q8 >> 8, STEP_MIN);
 }
 
 uint fly_color(Fly fly) {
@@ -213,7 +212,11 @@ uint fly_color(Fly fly) {
     return channels.x | channels.y << 8 | channels.z << 16;
 }
 
+// A colour of 16 bits stays as it is where it is the same in 8.
 void set_color(inout Fly fly, uint color) {
+    if (color == fly_color(fly)) {
+        return;
+    }
     uvec3 channels = (uvec3(color, color >> 8, color >> 16) & 255u) * 257u;
     fly.rg = channels.x | channels.y << 16;
     fly.ba = fly.ba & 0xFFFF0000u | channels.z;

@@ -1,5 +1,5 @@
-// How the invocations of a workgroup share the pixels of a box: patches of 8 columns, or as many as there are invocations,
-// and how they add up what they find. Needs LANES and WIDE.
+// How the invocations of a workgroup share the pixels of a box: patches of 8 columns, or as many as there are
+// invocations, and how they add up what they find. Needs LANES and WIDE.
 
 const int PATCH_WIDTH = LANES < 8u ? int(LANES) : 8;
 const int PATCH_HEIGHT = int(LANES) / PATCH_WIDTH;
@@ -68,8 +68,8 @@ uvec2 patches(ivec4 box) {
     return is_empty ? uvec2(0u) : uvec2(size) / uvec2(PATCH_WIDTH, PATCH_HEIGHT);
 }
 
-// Turns of the loops over a box whose body has a loop of so many turns. The passes that end a loop count, and run the loops
-// inside once more.
+// Turns of the loops over a box whose body has a loop of so many turns. The passes that end a loop count, and run the
+// loops inside once more.
 uint patch_turns(ivec4 box, uint inner) {
     uvec2 count = patches(box);
     return 3u + 3u * count.y + count.x * count.y * (1u + inner);

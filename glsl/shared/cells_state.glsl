@@ -1,4 +1,4 @@
-// The state of a cells search on the device, and what decides its steps. Layout: src/gpu/cells_layout.rs.
+// The state of a cells search on the device. Layout: src/gpu/cells/layout.rs. Needs cells_rules.glsl.
 
 // Step of a cell that has nothing to do.
 const uint STEP_DONE = 0xFFFFFFFFu;
@@ -15,83 +15,6 @@ struct Fly {
     uint h;
     // Mask; bit 16 is set if the fly is not absent.
     uint form;
-};
-
-struct SearchRules {
-    uint seed_low;
-    uint seed_high;
-    uint width;
-    uint height;
-    // Blocks of 8x8 px in a row.
-    uint columns;
-    // Logarithm of the side of a cell.
-    uint side_shift;
-    uint fly_count;
-    // Words of scratch for each cell.
-    uint scratch_words;
-    uint side;
-    uint candidates;
-    uint steps_per_fly;
-    uint deal_tournament;
-    // Largest change that is accepted.
-    int highest;
-    uint birth_q16;
-    uint recolor_q16;
-    uint edge;
-    uint turn;
-    uint shift;
-    uint depth;
-    uint mix_total;
-    uint place_tournament;
-    uint victim_tournament;
-    int side_low;
-    int side_high;
-    int aspect_high;
-    uint is_stroke;
-    uint angle_spread;
-    uint coherence_range;
-    uint side_min_q8;
-    uint side_max_q8;
-    uint aspect_max_q8;
-    uint overlap;
-    uint turn_penalty;
-    uint mask_first;
-    uint mask_count;
-    uint depth_gap;
-    // How far a tile may go from where it was.
-    uint leash;
-    // Width of the ring of grout, and its colour.
-    uint grout;
-    uint grout_color;
-    uint guide_columns;
-    uint guide_rows;
-    uint class_count;
-    // End, scale and first round of each class.
-    uint end_0;
-    uint end_1;
-    uint end_2;
-    uint scale_0;
-    uint scale_1;
-    uint scale_2;
-    uint scale_3;
-    uint first_round_0;
-    uint first_round_1;
-    uint first_round_2;
-    uint first_round_3;
-    // The colour behind all tiles, packed.
-    uint background;
-    // Where the lane lies in the buffers that all lanes share. Of the stacks: where it would if its first pixel were pixel 0; such
-    // sums wrap around.
-    uint lane;
-    uint first_fly;
-    uint first_deal;
-    uint first_cell;
-    uint first_pixel;
-    uint first_stack;
-    uint first_scratch;
-    uint first_guide;
-    uint first_mask;
-    uint first_origin;
 };
 
 struct Header {
@@ -141,7 +64,8 @@ layout(std430, binding = 0) readonly buffer RulesBuffer { SearchRules rules[]; }
 // The rules of this lane, read once: software Vulkan reads a buffer for each invocation anew.
 SearchRules rule;
 
-// 0: a dispatch serves one lane. Then its rules are the same everywhere as software Vulkan sees it, which is worth 3 % of its time.
+// 0: a dispatch serves one lane. Then its rules are the same everywhere as software Vulkan sees it, which is worth 3 %
+// of its time.
 layout(constant_id = 10) const uint MANY_LANES = 1u;
 
 // Begins the work for a lane: `main` does it first.
@@ -160,8 +84,9 @@ layout(std430, binding = 2) coherent buffer FliesBuffer { Fly flies[]; };
 layout(std430, binding = 3) coherent buffer CellsBuffer { CellRecord cells[]; };
 // Per fly its cell; then members by cell as they came; then members by cell and index.
 layout(std430, binding = 4) coherent buffer DealsBuffer { uint deals[]; };
-// Two words of four for each pixel, in blocks of 8x8: (target and in its highest byte the depth of the stack; the top fly, its z
-// and what cells_suit.glsl says, its error), (the under fly, its z and its error; the error of the background).
+// Two words of four for each pixel, in blocks of 8x8: (target and in its highest byte the depth of the stack; the top
+// fly, its z and what cells_suit.glsl says, its error), (the under fly, its z and its error; the error of the
+// background).
 layout(std430, binding = 5) coherent buffer PixelsBuffer { uvec4 pixels[]; };
 // Sine of 4,096 steps, 1,024 bell-shaped numbers, 2,049 factors of size.
 layout(std430, binding = 6) readonly buffer TablesBuffer { int tables[]; };
@@ -196,5 +121,5 @@ uvec2 picture_size() {
 }
 
 uvec2 search_seed() {
-    return uvec2(rule.seed_low, rule.seed_high);
+    return uvec2(rule.seed[0], rule.seed[1]);
 }

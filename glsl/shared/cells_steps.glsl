@@ -1,14 +1,11 @@
 // What the steps of a cell have in common, whatever its tiles are: the candidates, their making, and counters. Twin:
-// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_grid.glsl, cells_leash.glsl, cells_patches.glsl, cells_suit.glsl and
-// `without_victim`: what the objective changes when a child's victim goes, as far as no pixel has to be looked at for it.
+// src/cpu/cells/cell.rs. Needs cells_operators.glsl, cells_grid.glsl, cells_leash.glsl, cells_patches.glsl,
+// cells_suit.glsl and `without_victim`: what the objective changes when a child's victim goes, as far as no pixel has
+// to be looked at for it.
 
 const uint PAINT_KEEP = 0u;
 const uint PAINT_ANEW = 1u;
 const uint PAINT_BIRTH = 2u;
-const uint COLOR_MEDIAN = 0u;
-const uint COLOR_MEAN = 1u;
-const uint COLOR_PICK = 2u;
-const uint COLOR_EVOLVED = 3u;
 
 struct Candidate {
     Fly fly;
@@ -25,12 +22,20 @@ struct Candidate {
     int own;
 };
 
+// The best child so far; the same in all invocations.
+struct Best {
+    Candidate candidate;
+    int change;
+    // Whether `has_room` has to look closer.
+    bool is_crowded;
+};
+
 const uint CANDIDATE_WORDS = 13u;
 const uint BATCH = LANES < 64u ? LANES : 64u;
 shared uint shared_candidates[BATCH * CANDIDATE_WORDS];
 
-// What loops cost besides their turns: a loop that software Vulkan passes costs the turn that ends it, even where no invocation
-// enters it.
+// What loops cost besides their turns: a loop that software Vulkan passes costs the turn that ends it, even where no
+// invocation enters it.
 const uint STEP_TURNS = 40u;
 const uint BATCH_TURNS = 12u;
 const uint CANDIDATE_TURNS = 8u;
@@ -97,11 +102,11 @@ Candidate load_candidate(uint slot) {
     return candidate;
 }
 
-// Place of the least helpful of some random flies of the cell.
-uint least_helpful(uint draws) {
+// The place of who leaves for a new tile: the least helpful of some random flies of the cell.
+uint victim_of(uint draws) {
     int least = 0x7FFFFFFF;
     uint best = 0u;
-    for (uint number = 0u; number < rule.victim_tournament; ++number) {
+    for (uint number = 0u; number < rule.births.victim_tournament; ++number) {
         uint place = chain_below(draws, SLOT_VICTIM + number, cell.count);
         int value = fitness[rule.first_fly + member(place)];
         best = value < least ? place : best;
@@ -115,7 +120,7 @@ uvec3 worst_pixel(uint draws) {
     uvec4 bounds = grid_bounds(grid, cell_number);
     int worst = -1;
     uvec3 best = uvec3(bounds.xy, 0u);
-    for (uint number = 0u; number < rule.place_tournament; ++number) {
+    for (uint number = 0u; number < rule.births.place_tournament; ++number) {
         uint bits = chain_bits(draws, SLOT_PLACE + number);
         uvec2 pixel = bounds.xy
             + uvec2(below(bits << 16, bounds.z - bounds.x), below(bits & 0xFFFF0000u, bounds.w - bounds.y));
@@ -132,7 +137,7 @@ GuideSample local_at(Fly fly) {
 
 void make_birth(inout Candidate candidate, uint place, int place_fitness, uint draws) {
     candidate.paint = PAINT_BIRTH;
-    uint helpless = least_helpful(draws);
+    uint helpless = victim_of(draws);
     candidate.victim = place_fitness <= 0 ? place : helpless;
     uint index = member(candidate.victim);
     if (MUTANTS == 1u) {
@@ -149,13 +154,13 @@ void make_birth(inout Candidate candidate, uint place, int place_fitness, uint d
 
 void make_change(inout Candidate candidate, Fly fly, uint index, uint step, uint draws) {
     uint kind = chain_bits(draws, SLOT_KIND) & 0xFFFFu;
-    uint which = kind * rule.mix_total >> 16;
     uint side = own_side(index, local_at(fly));
-    uint edge = rule.edge;
-    uint turn = edge + rule.turn;
-    uint shift = turn + rule.shift;
-    uint depth = shift + rule.depth;
-    candidate.paint = chain_bits(draws, SLOT_RECOLOR) >> 16 < rule.recolor_q16 ? PAINT_ANEW : PAINT_KEEP;
+    uint edge = rule.mix.edge;
+    uint turn = edge + rule.mix.turn;
+    uint shift = turn + rule.mix.shift;
+    uint depth = shift + rule.mix.depth;
+    uint which = kind * (depth + rule.mix.recolor) >> 16;
+    candidate.paint = chain_bits(draws, SLOT_RECOLOR) >> 16 < rule.mix.recolor_q16 ? PAINT_ANEW : PAINT_KEEP;
     candidate.fly = fly;
     if (which < edge) {
         candidate.fly = edge_moved(fly, side, step, draws);
@@ -179,7 +184,7 @@ Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uin
     candidate.fly = fly;
     candidate.victim = place;
     candidate.is_valid = true;
-    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.birth_q16) {
+    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.mix.birth_q16) {
         make_birth(candidate, place, place_fitness, draws);
     } else {
         make_change(candidate, fly, index, steps[rule.first_fly + index], draws);
@@ -203,11 +208,30 @@ Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uin
     return candidate;
 }
 
-// The boxes to go through when a tile takes another one's place: the union of both, or one after the other where they are apart.
+// The boxes to go through when a tile takes another one's place: the union of both, or one after the other where they
+// are apart.
 void union_boxes(ivec4 old, ivec4 new, out ivec4 boxes[2]) {
     bool is_apart = old.x > old.z || new.x > new.z || old.z < new.x || new.z < old.x || old.w < new.y || new.w < old.y;
     boxes[0] = is_apart ? old : ivec4(min(old.xy, new.xy), max(old.zw, new.zw));
     boxes[1] = is_apart ? new : ivec4(1, 1, 0, 0);
+}
+
+// Turns of a pass over such boxes whose body has a loop of so many turns.
+uint boxes_turns(ivec4 boxes[2], uint inner) {
+    return patch_turns(boxes[0], inner) + patch_turns(boxes[1], inner);
+}
+
+// Gives an evaluated child, whose pixels change the objective so much, the best one's place if it is better. False if
+// the child is its victim again.
+bool offer(Candidate candidate, int change, bool is_crowded, inout Best best) {
+    if (candidate.is_same && candidate.fly.rg == candidate.old_rg && candidate.fly.ba == candidate.old_ba) {
+        return false;
+    }
+    change += candidate.own;
+    if (!best.candidate.is_valid || change < best.change) {
+        best = Best(candidate, change, is_crowded);
+    }
+    return true;
 }
 
 // Adds a number with a sign to one of 64 bits in two words.

@@ -1,5 +1,5 @@
-// What a tile wears, and what that makes of its error at a pixel. Twin: src/model/cells/suit.rs. Needs cells_state.glsl, tile.glsl,
-// mask.glsl, cells_footprint.glsl, cells_pixel.glsl.
+// What a tile wears, and what that makes of its error at a pixel. Twin: src/model/cells/suit.rs. Needs
+// cells_state.glsl, tile.glsl, mask.glsl, cells_footprint.glsl, cells_pixel.glsl.
 
 // What a tile shows at a pixel of its rectangle: its colour under a shade of 0 to 255, or one of these.
 const uint LOOK_GROUT = 256u;

@@ -5,8 +5,8 @@ const uint FLAG_CONTINUED = 2u;
 // A later dispatch goes on with this block.
 const uint FLAG_UNFINISHED = 4u;
 
-// What a tile shows at tile coordinates: its colour under its shade, and its coverage in the highest byte; 0 where it is
-// not.
+// What a tile shows at tile coordinates: its colour under its shade, and its coverage in the highest byte; 0 where it
+// is not.
 uint layer_at(uint first_mask, Tile tile, uvec2 uv) {
     uint layer = 0u;
     if (is_inside(tile, uv)) {

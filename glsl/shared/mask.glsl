@@ -1,4 +1,5 @@
-// Texels of masks from a storage buffer: software Vulkan would compute a texture's addressing for each. Needs tile.glsl.
+// Texels of masks from a storage buffer: software Vulkan would compute a texture's addressing for each. Needs
+// tile.glsl.
 
 // Two texels in a word: coverage, shade, coverage, shade; 256 rows of 256 texels for each layer.
 layout(std430, binding = MASK_BINDING) readonly buffer Masks { uint masks[]; };

@@ -19,15 +19,16 @@ const LEVEL: i64 = 6;
 /// Deflate level of what is compressed in a snapshot.
 const SNAPSHOT_LEVEL: i64 = 1;
 
-/// What counts more: the size of the file, or the time that it takes.
+/// What to save: bytes of the file, or time to write it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Thrift {
     Bytes,
-    /// Genes are nearly random and take most of the time to compress, to save a third of their bytes.
+    /// Genes are not compressed: they are nearly random, so compressing them takes most of the time and saves only a
+    /// third of their bytes.
     Time,
 }
 
-/// The population with the marginal fitness of each fly as a `.npz` file; `meta` goes into its `meta.json`.
+/// The population, with the marginal fitness of each fly, as a `.npz` file. `meta` goes into its `meta.json`.
 ///
 /// # Errors
 /// [`Error::Parameter`] if there is not one fitness per fly, if `meta` holds one of the keys that say how to read the
@@ -46,8 +47,8 @@ pub fn encode(population: &Population, fitness: &[i64], meta: &Map<String, Value
     encode_members(population, Some(fitness), meta, Thrift::Bytes)
 }
 
-/// The population as [`encode`] writes it, without marginal fitness and in less time: for the many populations that an
-/// evolution passes through.
+/// The population as [`encode`] writes it, but without marginal fitness and in less time: for the many populations on
+/// the way to a result.
 ///
 /// # Errors
 /// [`Error::Parameter`], as from [`encode`].
@@ -121,7 +122,7 @@ impl Members {
         Self { zip: ZipWriter::new(Cursor::new(Vec::new())), thrift }
     }
 
-    /// Begins a member; date, permissions and level are fixed so that nothing but the content decides the bytes.
+    /// Begins a member. Date, permissions and level are fixed, so only the content decides the bytes.
     fn start(&mut self, name: &str) -> zip::result::ZipResult<()> {
         let is_gene = || GENE_COLUMNS.iter().any(|column| npyz::npz::file_name_from_array_name(column) == name);
         let (method, level) = match self.thrift {
@@ -159,7 +160,8 @@ impl Members {
         values: impl Iterator<Item = T>,
     ) -> zip::result::ZipResult<()> {
         let dtype = DType::Plain(type_string.parse().expect("the type strings of this file are valid"));
-        // Built whole: value by value, the compressor would be called a million times.
+        // The array is built first and compressed in one call; value by value, the compressor would be called a million
+        // times.
         let mut bytes = Vec::new();
         let mut array = npyz::WriteOptions::new().dtype(dtype).shape(shape).writer(&mut bytes).begin_nd()?;
         array.extend(values)?;

@@ -1,9 +1,10 @@
-//! Populations as `.npz` files: what a run found, to be redrawn at any size, continued, or opened with numpy.
+//! Populations as `.npz` files: results that can be drawn again at any size, evolved further, or opened with numpy.
 //!
 //! One array per gene (`x y z r g b w h angle`, f32), `fitness` (i64), `mask` (u16), `alive` (bool), the mask layers as
-//! `mask_0`, `mask_1`, ... (u8, 256x256x2: coverage and shade), and `meta.json`. `numpy.load` opens it with no code.
-//! Files have fixed dates, order and compression: the same population gives the same bytes, and save, load, save
-//! changes nothing. For programs that do not read `.npz` there are tables (`table.rs`), which are not read back.
+//! `mask_0`, `mask_1`, ... (u8, 256x256x2: coverage and shade), and `meta.json`. `numpy.load` opens such a file
+//! directly. Dates, order and compression are fixed, so the same population gives the same bytes, and saving a loaded
+//! population changes nothing. For programs that do not read `.npz` there are tables (`table.rs`), which smalti does
+//! not read back.
 
 mod encode;
 mod read;
@@ -15,7 +16,7 @@ use serde_json::{Map, Value};
 use crate::model::{Blend, Grout, Population, Rgb};
 
 pub use encode::{encode, encode_snapshot};
-pub use read::{is_cut_short, read, read_meta};
+pub use read::{decode, is_cut_short, read, read_meta};
 pub use table::{KEY_DIGITS, encode_csv, encode_json, read_csv_meta, read_json_meta};
 
 /// Version of the file's layout.
@@ -30,23 +31,23 @@ const HEADER_MEMBER: &str = "meta.json";
 pub struct Archive {
     /// The flies with their masks, size and background; every gene lies within its bounds.
     pub population: Population,
-    /// Marginal fitness of every fly, as it was when the file was written; zeros if the file has none.
+    /// Marginal fitness of every fly when the file was written; zeros if the file has none.
     pub fitness: Vec<i64>,
-    /// What else the writer told: scheme, seed, versions, hash of the input.
+    /// The writer's own metadata: scheme, seed, versions, hash of the input.
     pub meta: Map<String, Value>,
 }
 
-/// The contents of `meta.json`: what the arrays need to be understood, and beside it the writer's own keys.
+/// The contents of `meta.json`: what is needed to understand the arrays, and the writer's own keys.
 #[derive(Debug, Serialize, Deserialize)]
 struct Header {
     schema: u32,
     width_px: u32,
     height_px: u32,
     background: [u8; 3],
-    /// Whether nothing lies behind the tiles; the colour is then that of programs without alpha.
+    /// Whether nothing lies behind the tiles. `background` is then the colour for programs without alpha.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     transparent: bool,
-    /// How coverage is read; opaque masks are the rule and need no word.
+    /// How coverage is read. Opaque masks are the default and are not mentioned.
     #[serde(default, skip_serializing_if = "BlendName::is_opaque")]
     blend: BlendName,
     /// Absent if tiles are drawn to their edges.
@@ -56,7 +57,7 @@ struct Header {
     meta: Map<String, Value>,
 }
 
-/// Keys of [`Header`], which the writer's own cannot have.
+/// Keys of [`Header`], which the writer's own metadata must not use.
 const HEADER_KEYS: [&str; 7] = ["schema", "width_px", "height_px", "background", "transparent", "blend", "grout"];
 
 /// [`Grout`] as the file spells it.

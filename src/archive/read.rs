@@ -1,7 +1,7 @@
-//! From a `.npz` file to a population, trusting nothing in it.
+//! From a `.npz` file to a population. Nothing in the file is trusted.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read};
+use std::io::{self, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 
 use npyz::{Deserialize, NpyFile, Order};
@@ -26,22 +26,30 @@ const HEADER_BYTES_MAX: u64 = 1 << 20;
 /// Most bytes of the text that describes an array; numpy writes about 120.
 const ARRAY_HEADER_BYTES_MAX: usize = 4096;
 
-/// Reads the population at `path`, ours or one that numpy wrote.
+/// Reads the population at `path`, whether smalti or numpy wrote it.
 ///
 /// Columns of floats may be f32 or f64; `fitness` may be absent. Values are rounded to the nearest gene; angles wrap.
 ///
 /// # Errors
-/// [`Error::Input`] with the name of the column if the file cannot be read, is no population, lacks a column, or holds
-/// one of another type or length, a value that is not finite, one that is farther than rounding from what a gene can be, or a
-/// mask that does not exist.
+/// [`Error::Input`] with the name of the column if the file cannot be read, is not a population or lacks a column; if a
+/// column has the wrong type or length; if a value is not finite, or out of a gene's range by more than rounding; or if
+/// a fly wears a mask that does not exist.
 pub fn read(path: &Path) -> Result<Archive> {
-    read_population(path).map_err(|reason| Error::input(path, reason))
+    Members::open(path).and_then(read_population).map_err(|reason| Error::input(path, reason))
 }
 
-/// What the writer of the population at `path` told, without reading the population.
+/// As [`read`], of the population that a file of these bytes would hold.
 ///
 /// # Errors
-/// [`Error::Input`] if the file cannot be read or is no population.
+/// A sentence without the file's name.
+pub fn decode(bytes: &[u8]) -> Result<Archive, String> {
+    Members::of(Cursor::new(bytes)).and_then(read_population)
+}
+
+/// The metadata of the population at `path`, without reading the population.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read or is not a population.
 pub fn read_meta(path: &Path) -> Result<Map<String, Value>> {
     Members::open(path)
         .and_then(|mut members| members.header())
@@ -49,8 +57,8 @@ pub fn read_meta(path: &Path) -> Result<Map<String, Value>> {
         .map_err(|reason| Error::input(path, reason))
 }
 
-/// Whether the file at `path` could be the beginning of an `.npz` file, perhaps with zeros after it: it lacks the list of members,
-/// with which such files end.
+/// Whether the file at `path` could be an `.npz` file that was cut short, perhaps with zeros after the cut: it lacks
+/// the list of members at the end.
 #[must_use]
 pub fn is_cut_short(path: &Path) -> bool {
     const BEGIN: [u8; 4] = *b"PK\x03\x04";
@@ -63,8 +71,7 @@ pub fn is_cut_short(path: &Path) -> bool {
     BEGIN.starts_with(&begin[..length]) && ZipArchive::new(BufReader::new(file)).is_err()
 }
 
-fn read_population(path: &Path) -> Result<Archive, String> {
-    let mut members = Members::open(path)?;
+fn read_population<R: Read + Seek>(mut members: Members<R>) -> Result<Archive, String> {
     let header = members.header()?;
     let masks = members.masks()?.with_blend(header.blend.into());
     let columns = members.genes()?;
@@ -99,9 +106,10 @@ fn read_population(path: &Path) -> Result<Archive, String> {
     Ok(Archive { population: Population { width_px, height_px, background, grout, masks, flies }, fitness, meta })
 }
 
-/// Least and largest value of each of [`GENE_COLUMNS`], and half the unit that it is rounded to; angles have no end.
+/// Least and largest value of each of [`GENE_COLUMNS`], and half the unit to which it is rounded; `None` for angles,
+/// which wrap.
 ///
-/// A value that is out of range by at most half a unit is one that rounding made, and rounds to the bound.
+/// A value that is out of range by at most half a unit comes from rounding, and is rounded to the bound.
 fn ranges(width_px: u32, height_px: u32) -> [Option<(f64, f64, f64)>; 9] {
     let px = f64::from(UNITS_PER_PX);
     let position = |side_px: u32| Some((0.0, f64::from(side_px - 1), 0.5 / px));
@@ -124,21 +132,27 @@ fn check_ranges(columns: &[Vec<f32>; 9], header: &Header) -> Result<(), String> 
     Ok(())
 }
 
-/// The members of a zip file; every failure is a sentence for the user.
-struct Members {
-    zip: ZipArchive<BufReader<File>>,
+/// The members of a zip file. Every error is a sentence for the user.
+struct Members<R> {
+    zip: ZipArchive<R>,
 }
 
-impl Members {
+impl Members<BufReader<File>> {
     fn open(path: &Path) -> Result<Self, String> {
         let unreadable = |error: io::Error| photo::why_unreadable(&error);
         let file = File::open(path).map_err(unreadable)?;
-        // Opening a folder succeeds, and reading it fails in words of the zip reader.
+        // A folder can be opened; reading it would fail with a message of the zip reader.
         if file.metadata().map_err(unreadable)?.is_dir() {
             return Err(unreadable(io::ErrorKind::IsADirectory.into()));
         }
-        let zip = ZipArchive::new(BufReader::new(file))
-            .map_err(|error| format!("is not a population: no readable .npz file ({error})"))?;
+        Self::of(BufReader::new(file))
+    }
+}
+
+impl<R: Read + Seek> Members<R> {
+    fn of(file: R) -> Result<Self, String> {
+        let zip =
+            ZipArchive::new(file).map_err(|error| format!("is not a population: no readable .npz file ({error})"))?;
         Ok(Self { zip })
     }
 
@@ -146,7 +160,7 @@ impl Members {
         self.zip.index_for_name(&npyz::npz::file_name_from_array_name(array)).is_some()
     }
 
-    /// The bytes of a member, at most `bytes_max` of them: a few bytes of zip may stand for terabytes.
+    /// The bytes of a member, at most `bytes_max`: a few bytes of a zip file may expand to terabytes.
     fn bytes(&mut self, member: &str, bytes_max: u64) -> Result<Vec<u8>, String> {
         let member_file = self.zip.by_name(member).map_err(|error| match error {
             ZipError::FileNotFound => format!("is not a population: it has no `{member}`"),
@@ -158,7 +172,7 @@ impl Members {
             .read_to_end(&mut bytes)
             .map_err(|error| format!("its `{member}` is broken ({error}); get the file again"))?;
         if bytes.len() as u64 > bytes_max {
-            return Err(format!("its `{member}` has more than {bytes_max} bytes, the most that is read"));
+            return Err(format!("its `{member}` is larger than the limit of {bytes_max} bytes"));
         }
         Ok(bytes)
     }
@@ -252,7 +266,7 @@ impl Members {
     }
 }
 
-/// The array in a member, its header parsed.
+/// The array in a member, with its header parsed.
 fn array<'a>(name: &str, bytes: &'a [u8]) -> Result<NpyFile<&'a [u8]>, String> {
     if array_header_bytes(bytes).is_none_or(|length| length > ARRAY_HEADER_BYTES_MAX) {
         return Err(format!("its `{name}` is not an array of numpy"));
@@ -260,7 +274,7 @@ fn array<'a>(name: &str, bytes: &'a [u8]) -> Result<NpyFile<&'a [u8]>, String> {
     NpyFile::new(bytes).map_err(|error| format!("its `{name}` is not an array of numpy ({error})"))
 }
 
-/// Length of the text that describes an array. It is a Python literal: a long one could nest deeper than a stack holds.
+/// Length of the text that describes an array. It is a Python literal, and parsing a long one could overflow the stack.
 fn array_header_bytes(bytes: &[u8]) -> Option<usize> {
     let version = *bytes.get(6)?;
     if version == 1 {
@@ -275,9 +289,7 @@ fn column_of<T: Deserialize>(name: &str, bytes: &[u8], type_name: &str) -> Resul
         return Err(format!("its column `{name}` has {} dimensions instead of one", array.shape().len()));
     };
     if length > FLY_COUNT_MAX as u64 {
-        return Err(format!(
-            "its column `{name}` has {length} values, more than the {FLY_COUNT_MAX} flies of the largest population"
-        ));
+        return Err(format!("its column `{name}` has {length} values, more than the limit of {FLY_COUNT_MAX} flies"));
     }
     let descr = array.dtype().descr();
     let wrong_type = || format!("its column `{name}` is of type {descr} instead of {type_name}");

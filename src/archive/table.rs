@@ -1,8 +1,8 @@
 //! Populations as tables for other programs: CSV and JSON, one row per fly, with the columns of the `.npz` file.
 //!
 //! Numbers are the shortest decimals that give the same f32 back, so a table is as exact as the `.npz`; `color` repeats
-//! `r g b` as tiles show it. A CSV has no place for metadata but its columns: the last four say in every row what decides
-//! whether the file may be replaced, as `meta` of a JSON table does.
+//! `r g b` as tiles show it. A CSV has no place for metadata except its columns. So every row repeats in its last four
+//! columns what decides whether the file may be replaced; a JSON table has that in `meta`.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -20,18 +20,18 @@ use crate::photo;
 
 /// First line of every CSV table.
 const CSV_HEADER: &[u8] = b"x,y,z,r,g,b,w,h,angle,mask,alive,fitness,color,status,restarts_made,sae,key\n";
-/// Digits of a key that a row of a table has room for.
+/// Number of digits of a key that a row of a table holds.
 pub const KEY_DIGITS: usize = 16;
-/// Most bytes of the first two lines of a CSV table that are read: many times what they have.
+/// The first two lines of a CSV table are searched for in this many bytes, many times what they need.
 const HEAD_BYTES_MAX: u64 = 1 << 12;
-/// What the first line of every JSON table begins with; the metadata follows, so that it is known without the rows.
+/// The beginning of every JSON table. The metadata follows on the same line, so it can be read without the rows.
 const JSON_HEAD: &str = "{\"meta\":";
 /// Most bytes of the first line of a JSON table that is read.
 const META_BYTES_MAX: u64 = 1 << 20;
 
-/// One fly; the order of the fields is that of the columns.
+/// One fly. The fields have the order of the columns.
 #[derive(Serialize)]
-struct Row {
+struct FlyRow {
     x: f32,
     y: f32,
     z: f32,
@@ -47,7 +47,7 @@ struct Row {
     color: String,
 }
 
-impl Row {
+impl FlyRow {
     fn new(fly: &Fly, fitness: i64) -> Self {
         let Genes { x, y, z, r, g, b, w, h, angle_deg } = fly.genes();
         let color = hexadecimal(fly.color());
@@ -55,16 +55,16 @@ impl Row {
     }
 }
 
-/// The last columns of a CSV; empty where the metadata tells none.
+/// The last columns of a CSV; empty where the metadata has no such key.
 #[derive(Serialize)]
-struct Told<'a> {
+struct LastColumns<'a> {
     status: &'a str,
     restarts_made: Option<u64>,
     sae: Option<u64>,
     key: &'a str,
 }
 
-impl<'a> Told<'a> {
+impl<'a> LastColumns<'a> {
     fn new(meta: &'a Map<String, Value>) -> Self {
         let text = |name| meta.get(name).and_then(Value::as_str).unwrap_or_default();
         let number = |name| meta.get(name).and_then(Value::as_u64);
@@ -78,27 +78,27 @@ impl<'a> Told<'a> {
     }
 }
 
-fn rows<'a>(population: &'a Population, fitness: &'a [i64]) -> impl Iterator<Item = Row> + 'a {
-    population.flies.iter().zip(fitness).map(|(fly, &fitness)| Row::new(fly, fitness))
+fn rows<'a>(population: &'a Population, fitness: &'a [i64]) -> impl Iterator<Item = FlyRow> + 'a {
+    population.flies.iter().zip(fitness).map(|(fly, &fitness)| FlyRow::new(fly, fitness))
 }
 
 /// The flies with their marginal fitness as CSV: a line of names, then a line per fly, which ends with `status`,
-/// `restarts_made`, `sae` and the first [`KEY_DIGITS`] digits of `key` as `meta` tells them.
+/// `restarts_made`, `sae` and the first [`KEY_DIGITS`] digits of `key`, all from `meta`.
 ///
 /// # Errors
-/// [`Error::Internal`] if the rows cannot be spelt.
+/// [`Error::Internal`] if the rows cannot be encoded.
 pub fn encode_csv(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
-    let told = Told::new(meta);
+    let last = LastColumns::new(meta);
     let failed = |error: &dyn std::fmt::Display| Error::Internal(format!("no CSV: {error}"));
     let mut csv = csv::WriterBuilder::new().has_headers(false).from_writer(CSV_HEADER.to_vec());
     for row in rows(population, fitness) {
-        csv.serialize((row, &told)).map_err(|error| failed(&error))?;
+        csv.serialize((row, &last)).map_err(|error| failed(&error))?;
     }
     csv.into_inner().map_err(|error| failed(&error))
 }
 
-/// What the CSV table at `path` tells of `status`, `restarts_made`, `sae` and `key`, by its first fly; `None` if it is not
-/// one of ours, or has no fly.
+/// `status`, `restarts_made`, `sae` and `key` from the first row of the CSV table at `path`; `None` if smalti did not
+/// write the table, or if it has no fly.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read.
@@ -121,10 +121,10 @@ pub fn read_csv_meta(path: &Path) -> Result<Option<Map<String, Value>>> {
     Ok(is_key.then(|| meta.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()))
 }
 
-/// The flies with their marginal fitness as one JSON object, a fly a line; `meta` goes in under that name.
+/// The flies with their marginal fitness as one JSON object, one fly per line, with `meta` under that name.
 ///
 /// # Errors
-/// [`Error::Internal`] if the rows cannot be spelt.
+/// [`Error::Internal`] if the rows cannot be encoded.
 pub fn encode_json(population: &Population, fitness: &[i64], meta: &Map<String, Value>) -> Result<Vec<u8>> {
     let Population { width_px, height_px, background, grout, masks, .. } = population;
     let grout = grout.map(|grout| ("grout", json!({"width": grout.width, "color": hexadecimal(grout.color)})));
@@ -156,7 +156,7 @@ fn background_word(background: Backdrop) -> String {
     }
 }
 
-/// The `meta` of the JSON table at `path`, without reading its rows; `None` if it is not one of ours.
+/// The `meta` of the JSON table at `path`, without reading its rows; `None` if smalti did not write the table.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read.

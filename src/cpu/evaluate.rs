@@ -1,23 +1,24 @@
 //! Twin of `glsl/evaluate.comp`: the two nearest flies of every pixel, the marginal fitness of every fly, and the SAE.
 //!
-//! Exact by construction: `F(i) = sum over pixels whose top is i of (|t - c2| - |t - c1|)` with the colours c1 of the
-//! top and c2 of the under fly (paper Eq. 3, for all flies at once).
+//! It is exact: `F(i) = sum over pixels whose top is i of (|t - c2| - |t - c1|)` with the colours c1 of the top and c2
+//! of the under fly (paper Eq. 3, for all flies at once).
 
 use multiversion::multiversion;
 
-use super::lane_evaluation::{Block, BlockView, PIXELS, SIDE, TargetBlock, error, inside};
-use super::rows::{TileRows, texels};
+use super::block::{Block, BlockView, PIXELS, SIDE, TargetBlock, inside};
+use super::coverage::{TileRows, texels};
+use super::error::error;
 use crate::model::blocks::index_of;
 use crate::model::mask::{COVERAGE_THRESHOLD, Mask, shaded};
 use crate::model::tile::{Tile, pack};
 
-/// After so many tiles it is worth a look whether every pixel has its top and under.
+/// The number of tiles after which it pays to check whether every pixel has its top and under.
 const LOOK_EVERY: u32 = 4;
 /// The shade that leaves a colour as it is.
 const BRIGHT: u32 = 255;
 
-/// Buffers for one block: per list slot the colour, and the part of marginal fitness. The slot after the last tile is
-/// the background.
+/// Buffers for one block: for each slot of its list the colour, and the part of marginal fitness. The slot after the
+/// last tile is the background's.
 #[derive(Default)]
 pub(super) struct Palette {
     colors: Vec<u32>,
@@ -31,7 +32,7 @@ pub(super) fn refresh(view: &BlockView<'_>, block: &mut Block, palette: &mut Pal
     let has_masks = view.lane.scene().masks.layers().len() > 1;
     let mut scan = Scan::new(view, if has_masks { 8 } else { 0 });
     block.closed_at = scan.scan_list(view, palette);
-    // Of the slots that nobody looked at only the background's is ever asked for.
+    // Of the slots that the scan does not reach, only the background's is ever read.
     palette.colors.resize(view.list.len(), 0);
     palette.colors.push(pack(view.lane.scene().background));
     palette.parts.clear();
@@ -44,7 +45,7 @@ pub(super) fn refresh(view: &BlockView<'_>, block: &mut Block, palette: &mut Pal
     block.under = scan.under.map(|key| view.fly(scan.slot(key)));
 }
 
-/// Adds up the errors of a block, and per slot the parts of marginal fitness.
+/// Adds up the errors of a block, and the parts of marginal fitness for each slot.
 #[inline(always)]
 fn add_up(view: &BlockView<'_>, scan: &Scan, palette: &mut Palette, color: impl Fn(u32, &Palette) -> u32) -> u32 {
     let (mut tops, mut unders) = ([0; PIXELS], [0; PIXELS]);
@@ -62,11 +63,11 @@ fn add_up(view: &BlockView<'_>, scan: &Scan, palette: &mut Palette, color: impl 
     sum
 }
 
-/// The two nearest tiles of a block's pixels, as keys: slots of its list, which rise with depth, so that the smallest two
-/// that cover a pixel are its top and under. With masks a key is `slot << 8 | shade`.
+/// The two nearest tiles of each pixel of a block, as keys. A key is a slot of the block's list, or `slot << 8 | shade`
+/// with masks. Slots rise with depth, so the two smallest keys that cover a pixel are its top and under.
 struct Scan {
     origin: (i32, i32),
-    /// The key of the background, in the slot after the last tile: no tile has a larger one.
+    /// The key of the background, whose slot comes after the last tile: no tile has a larger key.
     background: u32,
     shade_bits: u32,
     top: [u32; PIXELS],
@@ -77,7 +78,7 @@ impl Scan {
     #[inline(always)]
     fn new(view: &BlockView<'_>, shade_bits: u32) -> Self {
         let background = square_key(view.list.len() as u32, shade_bits);
-        // The overhang of a block at the edge counts nothing, and must not keep the block open.
+        // Pixels beyond the picture do not count, and must not keep the block open.
         let keys: TargetBlock = view.target.map(|pixel| background & inside(pixel));
         Self { origin: view.origin, background, shade_bits, top: keys, under: keys }
     }
@@ -87,8 +88,8 @@ impl Scan {
         key >> self.shade_bits
     }
 
-    /// Finds the top and under of every pixel, fills the palette's colours, and returns the depth key of the tile with
-    /// which every pixel had both.
+    /// Finds the top and under of every pixel and fills in the palette's colours. Returns the depth key of the tile
+    /// after which every pixel had both.
     #[inline(always)]
     fn scan_list(&mut self, view: &BlockView<'_>, palette: &mut Palette) -> u64 {
         for (slot, &key) in (0..).zip(view.list) {
@@ -115,7 +116,7 @@ impl Scan {
     /// Adds a tile without holes.
     #[inline(always)]
     fn add_square(&mut self, tile: &Tile, slot: u32) {
-        // A local, since the compiler cannot see that the rows never overlap the field.
+        // A local copy, since the compiler cannot see that the rows never overlap the field.
         let (none, key) = (self.background, square_key(slot, self.shade_bits));
         let mut rows = TileRows::new(tile, self.origin);
         for row in rows.rows.clone() {

@@ -1,51 +1,25 @@
-//! The running evaluation of one lane: which blocks are stale, and what each block adds to the sums.
+//! The evaluation of one lane, kept up to date: which blocks are stale, and what each block adds to the sums.
 //!
-//! Unlike the shaders, the twin keeps per block the depth behind which nothing shows, and leaves a block alone whose
-//! changes all lie behind it: on one core a block saved is time saved.
+//! Unlike the shaders, the twin stores for each block the depth behind which nothing shows, and skips a block whose
+//! changes all lie behind it. On a CPU, every block that is skipped saves time.
 
 use rayon::prelude::*;
 
+use super::block::{Block, BlockView, PIXELS, SIDE, TargetBlock};
 use super::{evaluate, translucent};
-use crate::model::blocks::index_of;
-use crate::model::lane::INSIDE;
-use crate::model::tally::{BlockParts, Tally};
-use crate::model::{Blend, Evaluation, Fly, Lane, Layers, NO_FLY, Scene};
+use crate::model::tally::Tally;
+use crate::model::{Blend, Evaluation, Fly, Lane, Layers, Scene};
 
-/// Pixels along each side of a block: one vector of 8 columns a row (`cargo bench --bench full_evaluation`).
-pub(super) const SIDE: usize = 8;
-pub(super) const PIXELS: usize = SIDE * SIDE;
-/// From this many stale blocks on, sharing them among threads pays for itself.
+/// From this many stale blocks on, it pays to share them among threads.
 const PARALLEL_FROM: usize = 128;
-/// Target pixels of one block, packed, with [`INSIDE`].
-pub(super) type TargetBlock = [u32; PIXELS];
-
-/// What is known of one block.
-#[derive(Clone, Debug)]
-pub(super) struct Block {
-    /// Per pixel the nearest fly that shows.
-    pub top: [u32; PIXELS],
-    /// Per pixel the next one.
-    pub under: [u32; PIXELS],
-    /// What the block adds to the fitness.
-    pub parts: BlockParts,
-    /// Depth key of the tile behind which nothing shows in any pixel, with or without any one fly.
-    pub closed_at: u64,
-}
-
-impl Default for Block {
-    fn default() -> Self {
-        Self { top: [NO_FLY; PIXELS], under: [NO_FLY; PIXELS], parts: BlockParts::default(), closed_at: u64::MAX }
-    }
-}
-
-/// Buffers that a thread uses again for each block.
+/// Buffers that a thread reuses for each block.
 #[derive(Default)]
 struct Buffers {
     palette: evaluate::Palette,
     stack: translucent::Stack,
 }
 
-/// The running evaluation of one lane.
+/// The evaluation of one lane, kept up to date.
 #[derive(Debug)]
 pub(super) struct LaneEvaluation {
     lane: Lane,
@@ -69,7 +43,7 @@ impl LaneEvaluation {
         &self.lane
     }
 
-    /// Evaluates a whole population afresh.
+    /// Evaluates a whole population.
     pub(super) fn load(&mut self, flies: &[Fly]) {
         self.lane.load(flies);
         let (lane, target) = (&self.lane, &self.target);
@@ -90,7 +64,8 @@ impl LaneEvaluation {
         self.lane.replace(index, fly);
     }
 
-    /// Refreshes the touched blocks in which a change can show: takes their old parts off the sums and adds the new ones.
+    /// Refreshes the touched blocks in which a change can show: subtracts their old parts from the sums and adds the
+    /// new ones.
     pub(super) fn refresh_touched(&mut self) {
         let (lane, target) = (&self.lane, &self.target);
         let view = |number: u32| BlockView::new(lane, number as usize, &target[number as usize]);
@@ -149,45 +124,4 @@ fn refresh(view: &BlockView<'_>, block: &mut Block, buffers: &mut Buffers) {
         Blend::Opaque => evaluate::refresh(view, block, &mut buffers.palette),
         Blend::Translucent => translucent::refresh(view, block, &mut buffers.stack),
     }
-}
-
-/// What a block is computed from.
-pub(super) struct BlockView<'a> {
-    pub lane: &'a Lane,
-    /// Depth keys of the tiles that touch the block, nearest first.
-    pub list: &'a [u64],
-    pub target: &'a TargetBlock,
-    /// Column and row of the upper left pixel.
-    pub origin: (i32, i32),
-}
-
-impl<'a> BlockView<'a> {
-    fn new(lane: &'a Lane, number: usize, target: &'a TargetBlock) -> Self {
-        let (x, y) = lane.lists().origin(number);
-        Self { lane, list: lane.lists().list(number), target, origin: (x as i32, y as i32) }
-    }
-
-    /// The flies of the list, nearest first.
-    pub(super) fn flies(&self) -> impl Iterator<Item = u32> {
-        self.list.iter().map(|&key| index_of(key))
-    }
-
-    /// The fly in a slot of the list; [`NO_FLY`] in the one after the last.
-    #[inline(always)]
-    pub(super) fn fly(&self, slot: u32) -> u32 {
-        self.list.get(slot as usize).map_or(NO_FLY, |&key| index_of(key))
-    }
-}
-
-/// Sum of absolute differences of the three channels.
-#[inline(always)]
-pub(super) fn error(a: u32, b: u32) -> i32 {
-    let channel = |shift: u32| ((a >> shift & 255) as i32 - (b >> shift & 255) as i32).abs();
-    channel(0) + channel(8) + channel(16)
-}
-
-/// All bits if the target pixel lies in the picture, none in the overhang of a block at the edge.
-#[inline(always)]
-pub(super) fn inside(wanted: u32) -> u32 {
-    if wanted & INSIDE != 0 { u32::MAX } else { 0 }
 }

@@ -1,18 +1,20 @@
 //! The CPU twin: evaluates and draws by the same integer steps as the shaders, one file per shader with the same stem.
 //!
-//! It is both the reference that every device is compared with and the evaluator of machines without a GPU. It is
-//! parallel over blocks on the current rayon pool; sums of integers do not depend on the order, so neither does any
-//! result. Twin: `gpu/` with `glsl/`.
+//! Every device is compared with the twin, and machines without a GPU use it as their evaluator. It works on blocks in
+//! parallel, on the current rayon pool. Sums of integers do not depend on their order, so neither does any result.
+//! Twin: `gpu/` with `glsl/`.
 
+mod block;
 pub mod cells;
+mod coverage;
+mod error;
 mod evaluate;
 mod lane_evaluation;
 mod mosaic;
-mod rows;
 mod translucent;
 
 use crate::error::Result;
-use crate::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
+use crate::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Painter, Population, Scene};
 
 use lane_evaluation::LaneEvaluation;
 
@@ -84,7 +86,13 @@ impl Evaluator for CpuEvaluator {
     fn read_back_layers(&mut self, lane: usize) -> Result<Layers> {
         Ok(self.known(lane).layers())
     }
+}
 
+/// The painter that needs no device.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CpuPainter;
+
+impl Painter for CpuPainter {
     fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
         Ok(mosaic::draw(population, canvas, supersampling))
     }

@@ -1,6 +1,6 @@
-//! Twin of `glsl/mosaic.vert` and `glsl/mosaic.frag`, and for translucent tiles of `glsl/compose.comp`: draws a
-//! population at any size by the exact coverage rule. Opaque tiles are painted from the farthest to the nearest;
-//! translucent ones are composited from the nearest to the farthest, as the fitness sees them.
+//! Twin of `glsl/mosaic.vert` and `glsl/mosaic.frag`, and of `glsl/compose.comp` for translucent tiles: draws a
+//! population at any size by the exact coverage rule. Opaque tiles are painted from the farthest to the nearest.
+//! Translucent ones are composited from the nearest to the farthest, as in the fitness.
 
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
     let mut lists = BlockLists::new(&samples, side);
     lists.fill(&population.flies, &tiles);
     let mut mosaic = Mosaic::new(canvas, population.background);
-    // A row of patches at a time, so that memory does not grow with the number of samples.
+    // One row of patches at a time, so that memory does not grow with the number of samples.
     for first in (0..lists.block_count()).step_by(lists.columns() as usize) {
         let drawn: Vec<(Patch, Vec<u32>)> = (first..first + lists.columns() as usize)
             .into_par_iter()
@@ -57,7 +57,7 @@ fn draw_patch(population: &Population, tiles: &[Tile], list: &[u64], patch: &Pat
             let mut colors = vec![background.map_or(0, pack); sample_count];
             for (tile, mask) in tiles.rev() {
                 let own = |texel: Texel| shaded(tile.color, u32::from(texel.shade)) | SOLID;
-                // Two loops, so that drawing without grout does not ask for it at every sample.
+                // Two loops, so that drawing without grout does not test for it at every sample.
                 match population.grout.map(|grout| pack(grout.color) | SOLID) {
                     None => for_each_solid(tile, mask, patch, |sample, _, texel| colors[sample] = own(texel)),
                     Some(grout) => for_each_solid(tile, mask, patch, |sample, (u, v), texel| {
@@ -82,7 +82,7 @@ fn draw_patch(population: &Population, tiles: &[Tile], list: &[u64], patch: &Pat
     }
 }
 
-/// The texel that a square has everywhere.
+/// The texel of a plain square, the same everywhere.
 const FULL: Texel = Texel { coverage: 255, shade: 255 };
 
 /// As [`for_each_texel`], but only where the mask is solid.
@@ -94,8 +94,8 @@ fn for_each_solid(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut
     });
 }
 
-/// Calls `visit` with each sample of the patch inside the tile's square, counted row by row, its tile coordinates and the
-/// texel there.
+/// Calls `visit` for each sample of the patch inside the tile's rectangle, with its index (row by row), its tile
+/// coordinates and the texel there.
 fn for_each_texel(tile: &Tile, mask: &Mask, patch: &Patch, mut visit: impl FnMut(usize, (u32, u32), Texel)) {
     let (left, top) = (patch.x as i32, patch.y as i32);
     let columns = tile.x0.max(left)..tile.x1.min(left + patch.width_px as i32 - 1) + 1;

@@ -1,21 +1,22 @@
 //! Twin of `glsl/translucent.comp`: tiles composited by depth in fixed point (`model/translucency.rs`), the marginal
 //! fitness of every fly, and the SAE.
 //!
-//! Exact: leaving out layer k starts from the state before k and composites the layers behind it again, as each layer
-//! rounds. [`CHUNK`] layers are left out side by side, so that a layer is read once for all of them.
+//! This is exact. Since every layer rounds, leaving out layer k starts from the state before k and composites the
+//! layers behind it again. [`CHUNK`] layers are left out side by side, so that each layer is read once for all of them.
 
 #![allow(clippy::needless_range_loop, reason = "one index for several arrays of one length makes them vectors")]
 
 use multiversion::multiversion;
 
-use super::lane_evaluation::{Block, BlockView, PIXELS, SIDE, error, inside};
-use super::rows::{TileRows, texels};
+use super::block::{Block, BlockView, PIXELS, SIDE, inside};
+use super::coverage::{TileRows, texels};
+use super::error::error;
 use crate::model::blocks::index_of;
 use crate::model::mask::shaded;
 use crate::model::tile::{Tile, pack};
 use crate::model::translucency::{CLEAR, channel, kept, opacity, widest_after};
 
-/// Pixels that are computed together: two rows of a block.
+/// Number of pixels that are computed together: two rows of a block.
 const LANES: usize = 16;
 const GROUPS: usize = PIXELS / LANES;
 /// Layers that are left out side by side.
@@ -32,8 +33,9 @@ pub(super) struct Stack {
     parts: Vec<i32>,
 }
 
-/// The layers of a group of pixels, in rows: going down the rows, each pixel meets its layers from the nearest on. A
-/// tile lies in one row, the first below all layers of its pixels, so that it is added and summed up by vectors.
+/// The layers of a group of pixels, in rows. Down the rows, each pixel meets its layers from the nearest on. A tile
+/// lies in a single row, the first one below all earlier layers of its pixels, so that vectors can add it and sum it
+/// up.
 #[derive(Default)]
 struct Group {
     /// Colour under its shade, coverage in the highest byte; 0 where a pixel has no layer.
@@ -42,7 +44,7 @@ struct Group {
     slots: Vec<Lanes>,
     /// Row and slot of each tile.
     tiles: Vec<(u32, u32)>,
-    /// What leaving out each layer changes in the error.
+    /// By how much leaving out each layer changes the error.
     changes: Vec<Lanes>,
     /// Row after each pixel's last layer.
     ends: Lanes,
@@ -77,8 +79,8 @@ pub(super) fn refresh(view: &BlockView<'_>, block: &mut Block, stack: &mut Stack
     block.parts.set(view.flies(), &stack.parts, error);
 }
 
-/// Collects the layers of every pixel until none shows any more, and returns the depth key of the tile at which that
-/// was so.
+/// Collects the layers of every pixel until no deeper layer shows, and returns the depth key of the tile where that
+/// happened.
 #[inline(always)]
 fn collect(view: &BlockView<'_>, stack: &mut Stack) -> u64 {
     let targets = view.target.as_chunks().0;
@@ -101,13 +103,13 @@ fn collect(view: &BlockView<'_>, stack: &mut Stack) -> u64 {
     u64::MAX
 }
 
-/// Writes what a tile shows in a block: its colour under its shade, and its coverage in the highest byte. Returns the
-/// rows that it may have written.
+/// Writes what a tile shows in a block: its shaded colour, with its coverage in the highest byte. Returns the rows that
+/// it may have written.
 #[inline(always)]
 fn draw(view: &BlockView<'_>, tile: &Tile, words: &mut [u32; PIXELS]) -> std::ops::RangeInclusive<usize> {
     let mut rows = TileRows::new(tile, view.origin);
     let range = rows.rows.clone();
-    // A local, so that it is not loaded again for each pixel.
+    // A local copy, so that it is not loaded again for each pixel.
     let color = tile.color;
     let mask = &view.lane.scene().masks.layers()[tile.mask as usize];
     for row in range.clone() {
@@ -141,7 +143,7 @@ impl Group {
         self.top = [NO_SLOT; LANES];
         self.under = [NO_SLOT; LANES];
         for i in 0..LANES {
-            // The overhang of a block at the edge counts nothing: nothing shows there.
+            // Pixels beyond the picture do not count: nothing shows there.
             self.transmittance[i] = CLEAR & inside(target[i]);
         }
     }
@@ -152,7 +154,7 @@ impl Group {
         (0..LANES).fold(0, |open, i| open | self.transmittance[i] | self.widest[i]) == 0
     }
 
-    /// Adds a layer to the pixels that it covers and in which it may show.
+    /// Adds a layer to the pixels that it covers and where it may show.
     #[inline(always)]
     fn add(&mut self, words: &Lanes, slot: u32) {
         let (mut layer, mut any, mut row) = ([0; LANES], 0, 0);
@@ -186,7 +188,7 @@ impl Group {
         }
     }
 
-    /// Adds the changes of each tile's pixels to the part of its slot.
+    /// Adds the changes at the pixels of each tile to the part of its slot.
     #[inline(always)]
     fn add_up(&self, parts: &mut [i32]) {
         for &(row, slot) in &self.tiles {
@@ -200,7 +202,7 @@ impl Group {
     }
 }
 
-/// Compositing of a group of pixels: transmittance and the sum of each channel.
+/// A group of pixels between two layers: the transmittance and the sum of each channel.
 #[derive(Clone, Copy)]
 struct State {
     transmittance: Lanes,
@@ -225,7 +227,7 @@ impl State {
         }
     }
 
-    /// The error of each pixel over the background; 0 in the overhang of a block at the edge.
+    /// The error of each pixel over the background; 0 beyond the picture.
     #[inline(always)]
     fn errors(&self, target: &Lanes, background: u32) -> Lanes {
         let mut errors = [0; LANES];
@@ -239,7 +241,7 @@ impl State {
     }
 }
 
-/// Sets what leaving out each layer of the group changes in the error, and returns the error.
+/// Computes by how much leaving out each layer of the group changes the error, and returns the error.
 #[inline(always)]
 fn leave_out_each(group: &mut Group, target: &Lanes, background: u32) -> u32 {
     let mut whole = State::START;

@@ -3,12 +3,12 @@
 //! One generation: every evolution breeds, the evaluator refreshes what changed in one dispatch, every evolution
 //! absorbs its new fitness. The engine names no backend, reads no clock and writes no file; an [`Observer`] may.
 //!
-//! **Many pictures.** A device wants them as lanes, which share each dispatch: of one engine if all begin and end together,
-//! else of a [`PaperCrew`]. The CPU wants an engine each, by [`side_by_side`]: a birth touches a few blocks, too little work to share among threads, while whole evolutions share
-//! nothing and scale with the cores (`cargo bench --bench lanes`).
+//! **Many pictures.** On a device they should be lanes, which share each dispatch: the lanes of one engine if all begin
+//! and end together, else those of a [`Crew`]. On the CPU each picture should have its own engine, by [`side_by_side`].
+//! A birth touches only a few blocks, too little work to share among threads, but whole evolutions share nothing and
+//! scale with the cores (`cargo bench --bench lanes`).
 
 mod crew;
-mod paper_crew;
 mod stepping;
 
 use std::sync::Mutex;
@@ -17,65 +17,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use stepping::Stepper;
 
 use crate::error::{Error, Result};
-use crate::evolve::{Evolution, StopReason};
+use crate::evolve::{Ended, Evolution, Observer, Seen, StopReason};
 use crate::model::Evaluator;
 
-pub use self::crew::{Ended, Finished, SearchCrew};
-pub use self::paper_crew::{PaperCrew, PaperResult, PaperTask};
+pub use self::crew::{Crew, Finished, PaperTask, SearchTask, Task};
 
-/// Watches an evolution and may end it.
-pub trait Observer {
-    /// Called once, when the first populations have been evaluated.
-    fn at_start(&mut self, _evolutions: &[Evolution]) {}
-
-    /// Called after every generation; a reason ends all evolutions.
-    fn after_generation(&mut self, evolutions: &[Evolution]) -> Option<StopReason>;
-}
-
-/// An observer that never ends anything.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Undisturbed;
-
-impl Observer for Undisturbed {
-    fn after_generation(&mut self, _evolutions: &[Evolution]) -> Option<StopReason> {
-        None
-    }
-}
-
-/// Observes only if there is an observer.
-impl<O: Observer> Observer for Option<O> {
-    fn at_start(&mut self, evolutions: &[Evolution]) {
-        if let Some(observer) = self {
-            observer.at_start(evolutions);
-        }
-    }
-
-    fn after_generation(&mut self, evolutions: &[Evolution]) -> Option<StopReason> {
-        self.as_mut()?.after_generation(evolutions)
-    }
-}
-
-/// Both observe; the first reason counts.
-impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
-    fn at_start(&mut self, evolutions: &[Evolution]) {
-        self.0.at_start(evolutions);
-        self.1.at_start(evolutions);
-    }
-
-    fn after_generation(&mut self, evolutions: &[Evolution]) -> Option<StopReason> {
-        let (one, other) = (self.0.after_generation(evolutions), self.1.after_generation(evolutions));
-        one.or(other)
-    }
-}
-
-/// Does `count` independent pieces of work, such as an engine each, on as many threads as the current rayon pool has; the
-/// results, in order.
+/// Does `count` independent pieces of work, such as an engine each, on as many threads as the current rayon pool has.
+/// Returns the results in order.
 ///
-/// Each thread takes the next piece when it is done with one. What a piece itself would share among threads stays on its
-/// own: waiting for a share, a thread of a common pool might begin another whole piece.
+/// Each thread takes the next piece when it has finished one. Parallel work within a piece stays on the piece's own
+/// thread: in a common pool, a thread that waits for others might begin another whole piece.
 ///
 /// # Errors
-/// The error of the first piece, in order, that has one; [`Error::Internal`] if threads cannot be started.
+/// The error of the first piece, in order, that fails; [`Error::Internal`] if threads cannot be started.
 pub fn side_by_side<T: Send>(count: usize, piece: impl Fn(usize) -> Result<T> + Sync) -> Result<Vec<T>> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::with_capacity(count));
@@ -131,21 +85,63 @@ impl Engine {
         &mut *self.evaluator
     }
 
-    /// Evolves all lanes until each has ended, then loads the best populations, so that the evaluator's fitness is
-    /// theirs.
+    /// Evolves all lanes until each has ended. Then loads the best populations, so that the evaluator has their
+    /// fitness.
     ///
     /// # Errors
-    /// If the evaluator's device fails.
+    /// If the evaluator's device fails, or `observer`.
     pub fn run(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        self.begin(observer)?;
+        while self.step(observer)? {}
+        self.end(observer)
+    }
+
+    /// Evaluates the first populations: what [`Engine::run`] does first.
+    ///
+    /// # Errors
+    /// If the evaluator's device fails, or `observer`.
+    pub fn begin(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        Stepper::begin(&mut *self.evaluator, &mut self.evolutions)?;
+        observer.at_start(&mut Seen::Evolutions(&self.evolutions))
+    }
+
+    /// Makes a generation; returns false if all lanes have ended.
+    ///
+    /// # Errors
+    /// If the evaluator's device fails, or `observer`.
+    pub fn step(&mut self, observer: &mut dyn Observer) -> Result<bool> {
         let Self { evaluator, evolutions, stepper } = self;
-        Stepper::begin(&mut **evaluator, evolutions)?;
-        observer.at_start(evolutions);
-        while stepper.generation(&mut **evaluator, evolutions)? > 0 {
-            if let Some(reason) = observer.after_generation(evolutions) {
-                evolutions.iter_mut().for_each(|evolution| evolution.stop(reason));
-            }
+        if stepper.generation(&mut **evaluator, evolutions)? == 0 {
+            return Ok(false);
         }
-        Stepper::end(&mut **evaluator, evolutions)
+        let mut seen = Seen::Evolutions(evolutions);
+        let (one, other) = (observer.after_round(&mut seen)?, observer.after_epoch(&mut seen)?);
+        if let Some(reason) = one.or(other) {
+            self.stop(reason);
+        }
+        Ok(true)
+    }
+
+    /// Ends all lanes that have not ended, for this reason.
+    pub fn stop(&mut self, reason: StopReason) {
+        self.evolutions.iter_mut().for_each(|evolution| evolution.stop(reason));
+    }
+
+    /// Evaluates the best populations: what [`Engine::run`] does last.
+    ///
+    /// # Errors
+    /// If the evaluator's device fails, or `observer`.
+    pub fn end(&mut self, observer: &mut dyn Observer) -> Result<()> {
+        Stepper::end(&mut *self.evaluator, &self.evolutions)?;
+        observer.at_end(&mut Seen::Evolutions(&self.evolutions))
+    }
+
+    /// The result of a lane's evolution, after [`Engine::run`].
+    ///
+    /// # Errors
+    /// As [`Ended::of_evolution`].
+    pub fn ended(&self, lane: usize) -> Result<Ended> {
+        Ended::of_evolution(&self.evolutions[lane], &self.evaluator.evaluation(lane))
     }
 }
 

@@ -1,15 +1,15 @@
-//! One generation of any number of evolutions: every one breeds, the evaluator refreshes what changed in one dispatch, every
-//! one absorbs its new fitness.
+//! Makes one generation of any number of evolutions: each of them breeds, the evaluator refreshes what changed in one
+//! dispatch, and each absorbs its new fitness.
 
 use crate::error::Result;
 use crate::evolve::{Evolution, Step};
 use crate::model::{Change, Evaluator, Fly};
 
-/// Steps evolutions; its buffers are used again in each generation.
+/// Steps evolutions. It reuses its buffers in each generation.
 #[derive(Debug, Default)]
 pub(super) struct Stepper {
     changes: Vec<Change>,
-    /// Per evolution the end of its share of the changes.
+    /// For each evolution the end of its part of the changes.
     ends: Vec<usize>,
     restarted: Vec<usize>,
 }
@@ -59,7 +59,7 @@ impl Stepper {
         Ok(alive)
     }
 
-    /// Evaluates the best populations of evolutions, so that the fitness of their lanes is theirs.
+    /// Evaluates the best populations of evolutions, so that their lanes have that fitness.
     pub fn end(evaluator: &mut dyn Evaluator, evolutions: &[Evolution]) -> Result<()> {
         load(evaluator, evolutions, Evolution::best_flies)
     }

@@ -1,4 +1,4 @@
-//! How a new fly comes about: born of one good fly or of two, mutated or not, random, or split off another.
+//! Makes new flies: children of one good fly or of two, mutated or not, random flies, and halves of flies that split.
 
 use super::first::newcomers;
 use super::scheme::{ONE_Q16, PaperScheme};
@@ -15,7 +15,7 @@ pub(super) struct Breeder {
 }
 
 impl Breeder {
-    /// The breeder of the first run, in which `living` flies live and wear `layers`.
+    /// The breeder of the first run, in which `living` flies live and wear the mask `layers`.
     pub(super) fn new(scheme: &PaperScheme, size_px: (u32, u32), living: usize, layers: &[u16]) -> Self {
         Self {
             amplitudes: Amplitudes::paper(size_px.0, size_px.1, living).turning(scheme.rotation),
@@ -28,7 +28,7 @@ impl Breeder {
         &self.newcomers.layers
     }
 
-    /// From now on random flies wear `layers`.
+    /// Sets the mask layers that random flies wear from now on.
     pub(super) fn set_layers(&mut self, layers: &[u16]) {
         self.newcomers.layers = layers.to_vec();
     }
@@ -38,7 +38,8 @@ impl Breeder {
         self.amplitudes = self.amplitudes.scaled(factor_q16);
     }
 
-    /// A new fly by the marginal fitness of the living `flies`. Each chance is drawn only if it is one.
+    /// A new fly. Its parents are chosen by the marginal fitness of the living `flies`. A chance at its default draws
+    /// no random number.
     pub(super) fn child(&self, scheme: &PaperScheme, flies: &[Fly], marginal: &[i64], stream: &mut Stream) -> Fly {
         if scheme.new_blood_q16 > 0 && stream.chance(scheme.new_blood_q16) {
             return self.newcomers.fly(stream);
@@ -55,8 +56,8 @@ impl Breeder {
         scheme.color.mutated(&child, self.mutant(&child, stream), stream)
     }
 
-    /// Mitosis: of the first `living` flies, which live, those for whose half there is room split in two, each with half
-    /// of the area. The first is a copy, and the second, mutated, takes the next absent place.
+    /// Mitosis: the first `living` flies, which live, split in two as long as there is room, each half with half of the
+    /// area. One half is a copy. The other is mutated, and takes the next absent place.
     pub(super) fn split(&self, scheme: &PaperScheme, target: &Target, flies: &mut [Fly], living: usize, run: u32) {
         for place in living..flies.len().min(2 * living) {
             let half = halved(&flies[place - living]);

@@ -1,115 +1,41 @@
-//! Drives a search in cells: rounds in epochs, and when to stop.
+//! Drives a search in cells: groups rounds into epochs, and decides when to stop.
 //!
-//! Stops are looked at between epochs, and the evals after every round that may spend them, so that every device ends after the
-//! same round. Nothing here knows a device or
-//! a clock; an [`Observer`] may.
+//! Reasons to stop are checked between epochs, and the number of evals after every round that may reach the limit. So
+//! every device ends after the same round. Nothing here knows a device or a clock; an [`Observer`] may.
 
 use super::evolution::StopReason;
+use super::objective::{lowers_sae_alone, sae};
+use super::observer::{Observer, Seen};
 use crate::error::Result;
-use crate::model::cells::glaze::opacity_of;
+use crate::model::Fly;
 use crate::model::cells::{Course, Search, Standing};
-use crate::model::tile::unpack;
-use crate::model::translucency::Compositing;
-use crate::model::{Fly, Rgb};
 
-/// Version of the search: raised whenever the same picture, options and seed lead to another result.
-pub const CELLS_VERSION: u32 = 1;
-/// Most rounds of an epoch; after each so many, depths are spread evenly again.
+/// Most rounds of an epoch. After each epoch, depths are spread evenly again.
 pub const ROUNDS_PER_EPOCH: u32 = 4;
-/// Evals that an epoch of several rounds may have: clock and interrupts are looked at between epochs, and have to wait no longer
-/// than some tenths of a second.
+/// Most evals of an epoch of several rounds. The clock and interrupts are checked between epochs, and must not wait
+/// longer than some tenths of a second.
 const EVALS_PER_EPOCH: u64 = 250_000;
-/// Evals for each fly, unless asked otherwise: two million for the 5,000 flies of a picture of 512x512 px.
+/// Default number of evals for each fly: two million for the 5,000 flies of a picture of 512x512 px.
 pub const EVALS_PER_FLY: u64 = 400;
-/// Epochs in a row without an eval after which none is to be expected any more, as of a picture too small for a child.
+/// After this many epochs in a row without an eval, none is to be expected, for instance because the picture is too
+/// small for a child.
 const IDLE_EPOCHS_MAX: u32 = 256;
-/// Of the objective, the share that it must fall by for the search to count as improving: a thousandth.
+/// The search counts as improving if the objective falls by its share of one divided by this number: a thousandth.
 const IMPROVEMENT: i64 = 1_000;
 
 /// When a search ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
-    /// Once so many children were evaluated.
+    /// After this many children were evaluated.
     pub evals: u64,
     /// Once the SAE is at most this.
     pub target_sae: Option<u64>,
-    /// Once so many children were evaluated in a row while the objective fell by less than a thousandth.
+    /// After this many children were evaluated in a row while the objective fell by less than a thousandth.
     pub patience: Option<u64>,
 }
 
-/// Watches a search and may end it.
-pub trait Observer {
-    /// Called once before the first round.
-    ///
-    /// # Errors
-    /// If the device fails.
-    fn at_start(&mut self, _search: &mut dyn Search) -> Result<()> {
-        Ok(())
-    }
-
-    /// Whether it wants to be called after every round, too: then a device cannot make several at once.
-    fn looks_at_rounds(&self) -> bool {
-        false
-    }
-
-    /// Called after every round, if some observer wants that.
-    ///
-    /// # Errors
-    /// If the device fails.
-    fn after_round(&mut self, _search: &mut dyn Search) -> Result<()> {
-        Ok(())
-    }
-
-    /// Called after every epoch; a reason ends the search.
-    ///
-    /// # Errors
-    /// If the device fails.
-    fn after_epoch(&mut self, search: &mut dyn Search) -> Result<Option<StopReason>>;
-}
-
-/// Observes only if there is an observer.
-impl<O: Observer> Observer for Option<O> {
-    fn at_start(&mut self, search: &mut dyn Search) -> Result<()> {
-        self.as_mut().map_or(Ok(()), |observer| observer.at_start(search))
-    }
-
-    fn looks_at_rounds(&self) -> bool {
-        self.as_ref().is_some_and(O::looks_at_rounds)
-    }
-
-    fn after_round(&mut self, search: &mut dyn Search) -> Result<()> {
-        self.as_mut().map_or(Ok(()), |observer| observer.after_round(search))
-    }
-
-    fn after_epoch(&mut self, search: &mut dyn Search) -> Result<Option<StopReason>> {
-        self.as_mut().map_or(Ok(None), |observer| observer.after_epoch(search))
-    }
-}
-
-/// Both observe; the first reason counts.
-impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
-    fn at_start(&mut self, search: &mut dyn Search) -> Result<()> {
-        self.0.at_start(search)?;
-        self.1.at_start(search)
-    }
-
-    fn looks_at_rounds(&self) -> bool {
-        self.0.looks_at_rounds() || self.1.looks_at_rounds()
-    }
-
-    fn after_round(&mut self, search: &mut dyn Search) -> Result<()> {
-        self.0.after_round(search)?;
-        self.1.after_round(search)
-    }
-
-    fn after_epoch(&mut self, search: &mut dyn Search) -> Result<Option<StopReason>> {
-        let (one, other) = (self.0.after_epoch(search)?, self.1.after_epoch(search)?);
-        Ok(one.or(other))
-    }
-}
-
-/// Searches, from `first` if there are flies to begin with, until the budget is spent or `observer` says so. The last
-/// population is the best one, since the objective never rises.
+/// Runs a search until the budget is spent or `observer` ends it. It begins with the flies of `first`, if given. The
+/// last population is the best one, since the objective never rises.
 ///
 /// # Errors
 /// If the device fails.
@@ -122,75 +48,92 @@ pub fn run(
     if let Some(flies) = first {
         search.load(flies)?;
     }
-    observer.at_start(search)?;
+    observer.at_start(&mut Seen::Search(search))?;
     let pace = if observer.looks_at_rounds() { Pace::Rounds } else { Pace::Epochs };
     let mut drive = Drive::new(search, *budget, pace);
-    loop {
-        match drive.next(search)? {
-            Next::Advance(rounds) => {
-                search.advance(rounds)?;
-                if pace == Pace::Rounds {
-                    observer.after_round(search)?;
-                }
-            }
-            Next::Spread => {
-                search.renormalise()?;
-                if let Some(reason) = drive.end_epoch(search.standing()) {
-                    return Ok(reason);
-                }
-                if let Some(reason) = observer.after_epoch(search)? {
-                    return Ok(reason);
-                }
-            }
-            Next::Done(reason) => return Ok(reason),
+    let reason = loop {
+        if let Some(reason) = step(search, &mut drive, observer)? {
+            break reason;
         }
+    };
+    observer.at_end(&mut Seen::Search(search))?;
+    Ok(reason)
+}
+
+/// Does the next step of a search; returns a reason if the search has ended.
+///
+/// # Errors
+/// If the device fails, or `observer`.
+pub fn step(search: &mut dyn Search, drive: &mut Drive, observer: &mut dyn Observer) -> Result<Option<StopReason>> {
+    match drive.next(search)? {
+        Next::Advance(rounds) => {
+            search.advance(rounds)?;
+            if drive.pace == Pace::Rounds
+                && let Some(reason) = observer.after_round(&mut Seen::Search(search))?
+            {
+                drive.cut_epoch(reason);
+            }
+            Ok(None)
+        }
+        Next::Spread => {
+            search.renormalise()?;
+            let ended = drive.end_epoch(search.standing());
+            if ended.is_some() {
+                return Ok(ended);
+            }
+            let reason = observer.after_epoch(&mut Seen::Search(search))?;
+            Ok(drive.cut.or(reason))
+        }
+        Next::Done(reason) => Ok(Some(reason)),
     }
 }
 
-/// How many rounds a search is asked for at once.
+/// How many rounds a search makes in one call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// Each alone.
+    /// One at a time.
     Rounds,
-    /// Those of an epoch, where the budget allows, so that a device need not wait between them.
+    /// All rounds of an epoch, if the budget allows it, so that a device need not wait between them.
     Epochs,
 }
 
 /// What a search does next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// So many rounds.
+    /// Make this many rounds.
     Advance(u32),
-    /// Its depths are spread, and then comes [`Drive::end_epoch`].
+    /// Spread the depths, then call [`Drive::end_epoch`].
     Spread,
-    /// Nothing any more.
+    /// Nothing: the search has ended.
     Done(StopReason),
 }
 
-/// The way of a search, step by step, for those who drive several at once; [`run`] goes it in one go.
+/// Drives a search step by step, for callers that drive several at the same time. [`run`] does all steps in one call.
 ///
-/// Rounds are alike in evals on every device, so it is the same round everywhere after which the budget is spent.
+/// A round makes the same number of evals on every device, so the budget is spent after the same round everywhere.
 #[derive(Clone, Debug)]
 pub struct Drive {
     budget: Budget,
     pace: Pace,
-    /// Where the objective had fallen by a thousandth for the last time.
+    /// Evals and objective when the objective had last fallen by a thousandth.
     mark: Standing,
     idle_epochs: u32,
     /// Evals when the epoch began.
     begun_evals: u64,
-    /// Rounds left of the epoch that is under way, if one is.
+    /// Rounds left of the current epoch, if there is one.
     rounds_left: Option<u32>,
+    /// Why an observer ended the search in the middle of an epoch.
+    cut: Option<StopReason>,
 }
 
 impl Drive {
-    /// The way of a search that stands where it begins.
+    /// The drive of a search that is at its beginning.
     #[must_use]
     pub fn new(search: &dyn Search, budget: Budget, pace: Pace) -> Self {
-        Self { budget, pace, mark: search.standing(), idle_epochs: 0, begun_evals: 0, rounds_left: None }
+        Self { budget, pace, mark: search.standing(), idle_epochs: 0, begun_evals: 0, rounds_left: None, cut: None }
     }
 
-    /// What the search does next, after it has done what was told before.
+    /// The next step of the search. The caller must have done the step before.
     ///
     /// # Errors
     /// If the device fails.
@@ -212,7 +155,7 @@ impl Drive {
         }
     }
 
-    /// Begins an epoch; returns the rounds that are asked for first. Far from the end of the budget these are all.
+    /// Begins an epoch; returns the number of rounds to make first. Far from the end of the budget these are all.
     fn begin_epoch(&mut self, evals: u64, evals_per_round: u64) -> u32 {
         let rounds = (EVALS_PER_EPOCH / evals_per_round.max(1)).clamp(1, u64::from(ROUNDS_PER_EPOCH)) as u32;
         let is_near_the_end = self.budget.evals.saturating_sub(evals) <= evals_per_round * u64::from(rounds);
@@ -222,19 +165,26 @@ impl Drive {
         asked
     }
 
-    /// Ends an epoch whose depths were spread; a reason if the search makes no child any more.
+    /// Skips the rest of the epoch. The search ends for this reason once its depths are spread, just as after the round
+    /// that spends the budget.
+    fn cut_epoch(&mut self, reason: StopReason) {
+        self.rounds_left = self.rounds_left.map(|_| 0);
+        self.cut = Some(reason);
+    }
+
+    /// Ends an epoch whose depths were spread; returns a reason if the search makes no more children.
     pub fn end_epoch(&mut self, standing: Standing) -> Option<StopReason> {
         self.idle_epochs = if standing.evals == self.begun_evals { self.idle_epochs + 1 } else { 0 };
         (self.idle_epochs == IDLE_EPOCHS_MAX).then_some(StopReason::Dry)
     }
 }
 
-/// The most evals that a round can have: steps for each fly, and all candidates in each.
+/// The most evals that a round can have: a fixed number of steps for each fly, each with all candidates.
 fn evals_per_round(course: &Course) -> u64 {
     course.fly_count as u64 * u64::from(course.rules.steps_per_fly) * u64::from(course.rules.candidates)
 }
 
-/// Why the search ends here, if it does; `mark` is where the objective had fallen by a thousandth for the last time.
+/// Why the search ends here, if it does. `mark` tells when the objective had last fallen by a thousandth.
 fn spent(search: &mut dyn Search, budget: &Budget, mark: &mut Standing) -> Result<Option<StopReason>> {
     let now = search.standing();
     if let Some(target) = budget.target_sae
@@ -252,7 +202,8 @@ fn spent(search: &mut dyn Search, budget: &Budget, mark: &mut Standing) -> Resul
     Ok(is_stuck.then_some(StopReason::Patience))
 }
 
-/// Whether the SAE is at most `target`; the objective, which is never lower, often tells.
+/// Whether the SAE is at most `target`. The objective is never lower than the SAE, so it often answers this without
+/// reading pixels.
 fn is_reached(search: &mut dyn Search, target: u64) -> Result<bool> {
     let objective = search.standing().objective;
     if u64::try_from(objective).is_ok_and(|objective| objective <= target) {
@@ -261,59 +212,21 @@ fn is_reached(search: &mut dyn Search, target: u64) -> Result<bool> {
     Ok(!lowers_sae_alone(search.course()) && sae(search)? <= target)
 }
 
-/// Whether the objective of a course is the SAE: no pixel weighs more than another, all are wanted, and nothing is penalised.
-#[must_use]
-pub fn lowers_sae_alone(course: &Course) -> bool {
-    let penalties = &course.rules.penalties;
-    let is_plain = course.target.weights().is_none() && course.target.transparent().is_none();
-    is_plain && (penalties.overlap, penalties.hole, penalties.turn) == (0, 0, 0)
-}
-
-/// The SAE of the mosaic as a search stands: over all pixels that are wanted, whatever they weigh.
-///
-/// # Errors
-/// If the device fails.
-pub fn sae(search: &mut dyn Search) -> Result<u64> {
-    if lowers_sae_alone(search.course()) {
-        return Ok(search.standing().objective.unsigned_abs());
-    }
-    let stacks = search.read_back_stacks()?;
-    let Course { target, rules, .. } = search.course();
-    let ground = unpack(rules.background);
-    let is_translucent = search.course().is_translucent();
-    let error = |(pixel, stack): (usize, &Vec<(u32, i32)>)| {
-        if target.transparent().is_some_and(|transparent| transparent[pixel]) {
-            return 0;
-        }
-        if is_translucent {
-            let mut compositing = Compositing::START;
-            stack.iter().for_each(|&(_, look)| compositing.add(opacity_of(look as u32), unpack(look as u32)));
-            return difference(target.pixels()[pixel], compositing.over(ground));
-        }
-        let weight = target.weights().map_or(1, |weights| u64::from(weights[pixel]));
-        stack.first().map_or_else(|| difference(target.pixels()[pixel], ground), |&(_, error)| error as u64 / weight)
-    };
-    Ok(stacks.pixels.iter().enumerate().map(error).sum())
-}
-
-fn difference(one: Rgb, other: Rgb) -> u64 {
-    one.iter().zip(other).map(|(&a, b)| u64::from(a.abs_diff(b))).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::evolve::observer::Undisturbed;
     use crate::model::cells::{Rules, SearchState, Stacks};
     use crate::model::{Guide, GuideSample, MaskSet, Target};
 
-    /// A search of one white pixel whose objective falls by a share of itself each round, and that counts its calls.
+    /// A search of one white pixel. Its objective falls by a share of itself each round, and it counts its calls.
     struct Scripted {
         course: Course,
         standing: Standing,
         evals_per_round: u64,
-        /// The objective loses a part in so many.
+        /// The objective loses one part in this many.
         loss: i64,
         calls: Vec<u32>,
     }
@@ -380,7 +293,8 @@ mod tests {
             true
         }
 
-        fn after_epoch(&mut self, search: &mut dyn Search) -> Result<Option<StopReason>> {
+        fn after_epoch(&mut self, seen: &mut Seen<'_>) -> Result<Option<StopReason>> {
+            let Seen::Search(search) = seen else { panic!("it is a search") };
             Ok((search.standing().rounds >= self.0).then_some(StopReason::Time))
         }
     }
@@ -388,7 +302,7 @@ mod tests {
     const ENDLESS: Budget = Budget { evals: u64::MAX, target_sae: None, patience: None };
 
     fn run_until(search: &mut Scripted, budget: Budget) -> (StopReason, u32) {
-        let reason = run(search, None, &budget, &mut None::<EndAt>).expect("nothing fails");
+        let reason = run(search, None, &budget, &mut Undisturbed).expect("nothing fails");
         (reason, search.standing.rounds)
     }
 
@@ -425,6 +339,29 @@ mod tests {
         alone.load(&[Fly::ABSENT]).expect("nothing fails");
         run_until(&mut alone, Budget { evals: 80, ..ENDLESS });
         assert_eq!((alone.calls, alone.standing), (vec![4, 0, 1, 1, 1, 1, 0], watched.standing));
+    }
+
+    /// Ends after the given round, wherever in an epoch that is.
+    struct CutAt(u32);
+
+    impl Observer for CutAt {
+        fn looks_at_rounds(&self) -> bool {
+            true
+        }
+
+        fn after_round(&mut self, seen: &mut Seen<'_>) -> Result<Option<StopReason>> {
+            let Seen::Search(search) = seen else { panic!("it is a search") };
+            Ok((search.standing().rounds >= self.0).then_some(StopReason::Interrupted))
+        }
+    }
+
+    #[test]
+    fn a_search_that_is_cut_amid_an_epoch_is_where_a_budget_of_its_evals_ends() {
+        let (mut cut, mut spent) = (Scripted::new(10, 7), Scripted::new(10, 7));
+        let reason = run(&mut cut, None, &ENDLESS, &mut CutAt(6)).expect("nothing fails");
+        assert_eq!(reason, StopReason::Interrupted);
+        run_until(&mut spent, Budget { evals: 60, ..ENDLESS });
+        assert_eq!((cut.standing, cut.calls), (spent.standing, vec![1, 1, 1, 1, 0, 1, 1, 0]));
     }
 
     #[test]

@@ -19,23 +19,24 @@ pub enum ColorMode {
     Median,
 }
 
-/// The colour mode, and the colours that there are.
+/// The colour mode, and the palette.
 ///
-/// A tile *shows* at the pixels where, in the place of the fly that it replaces, it would be in front of all others of the
-/// population before the generation. Each target channel is divided by the texel's shade, so that the shaded colour fits.
-/// A tile that shows nowhere takes all pixels that it covers, and one that covers none the pixel nearest to its centre.
-/// The flies of a whole new population, which have no population to show against, take that pixel too.
+/// A tile *shows* at the pixels where it would be in front of all others, if it took the place of the fly that it
+/// replaces in the population before the generation. Each target channel is divided by the texel's shade, so that the
+/// shaded colour fits. A tile that shows nowhere takes all pixels that it covers, and one that covers none takes the
+/// pixel nearest to its centre. So do the flies of a whole new population, which have no others to show in front of.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ColorRule {
     /// Where colours come from.
     pub mode: ColorMode,
-    /// If there is one, every colour becomes the nearest of it.
+    /// With a palette, every colour becomes the nearest one of the palette.
     pub palette: Option<Palette>,
 }
 
 impl ColorRule {
-    /// `mutant` of `origin`, its genes before mutation. With a palette an evolved colour takes no small step, which would
-    /// lead back to where it was: one time in eight it becomes any colour of the palette, else it stays.
+    /// The colour rule for `mutant`, whose genes before mutation were `origin`. With a palette an evolved colour takes
+    /// no small step, which would lead back to the colour that it had. Instead it becomes any colour of the palette one
+    /// time in eight, and stays otherwise.
     pub(super) fn mutated(&self, origin: &Fly, mutant: Fly, stream: &mut Stream) -> Fly {
         match (&self.palette, self.mode) {
             (Some(palette), ColorMode::Evolved) if stream.chance(1 << 13) => mutant.with_color(palette.random(stream)),

@@ -20,18 +20,18 @@ use crate::model::{Change, Evaluation, Fly, Lane, Target};
 pub enum StopReason {
     /// All births of all runs were made.
     Births,
-    /// As many children were evaluated as a search in cells was given.
+    /// A search in cells spent its evals.
     Evals,
-    /// The last run saw no better population for as many births as its patience; in cells, no much better one for as many
-    /// evals.
+    /// The last run found no better population for as many births as its patience allows; in cells, no clearly better
+    /// one for as many evals.
     Patience,
     /// No fly with marginal fitness <= 0 was left; in cells, no child was possible.
     Dry,
     /// The global fitness reached the target.
     TargetSae,
-    /// Ended from outside: the time was up.
+    /// The caller ended it: the time was up.
     Time,
-    /// Ended from outside: interrupted.
+    /// The caller ended it: it was interrupted.
     Interrupted,
 }
 
@@ -62,7 +62,7 @@ pub enum Step {
     Stop(StopReason),
 }
 
-/// What an evolution counted.
+/// The counts of an evolution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Births of all runs.
@@ -81,7 +81,7 @@ pub struct Evolution {
     width_px: u32,
     height_px: u32,
     flies: Vec<Fly>,
-    /// Flies that take part, from the first on; the others wait, absent, for mitosis.
+    /// How many flies live. They come first; the others are absent until mitosis.
     living: usize,
     sae: Option<u64>,
     best: Option<BestPopulation>,
@@ -95,7 +95,7 @@ pub struct Evolution {
 }
 
 impl Evolution {
-    /// An evolution of `lane`, a picture of `width_px` x `height_px`, that begins from `flies`: a population by
+    /// An evolution of `lane`, a picture of `width_px` x `height_px`, that begins from `flies`: a population from
     /// [`super::first_population`] or [`super::begin_from`].
     ///
     /// # Panics
@@ -139,7 +139,7 @@ impl Evolution {
         &self.flies
     }
 
-    /// Flies that take part; fewer than there are until the last split.
+    /// How many flies live. Before the last split there are fewer than in the whole population.
     #[must_use]
     pub fn living(&self) -> usize {
         self.living
@@ -151,15 +151,14 @@ impl Evolution {
         self.mask_changes
     }
 
-    /// Whether the current run, or the last one, is followed by a change of masks or a split, so that its populations are
-    /// not what the result is to be.
+    /// Whether masks change or flies split after the current (or last) run. Then its populations are not yet of the
+    /// kind that the result will be.
     #[must_use]
     pub fn is_warming_up(&self) -> bool {
         self.scheme.is_warm_up(self.outcome.restarts)
     }
 
-    /// The best population since masks changed or flies split for the last time; the current one before the first
-    /// evaluation.
+    /// The best population since masks last changed or flies last split. Before the first evaluation, the current one.
     #[must_use]
     pub fn best_flies(&self) -> &[Fly] {
         self.best.as_ref().map_or(&self.flies, BestPopulation::flies)
@@ -189,7 +188,7 @@ impl Evolution {
         self.outcome
     }
 
-    /// Births of the current run, or of the last one: fewer than planned if it was cut.
+    /// Births of the current or last run. There are fewer than planned if it was cut short.
     #[must_use]
     pub fn births_in_run(&self) -> u64 {
         self.births_in_run
@@ -213,12 +212,12 @@ impl Evolution {
         self.stop
     }
 
-    /// Ends the evolution from outside.
+    /// Ends the evolution for a reason of the caller's.
     pub fn stop(&mut self, reason: StopReason) {
         self.stop.get_or_insert(reason);
     }
 
-    /// Decides the next step against the current population as `lane` holds it, and its fitness, and adds its changes to
+    /// Decides the next step from the current population, as `lane` holds it, and from its fitness. Adds its changes to
     /// `changes`.
     pub fn breed(&mut self, lane: &Lane, evaluation: &Evaluation<'_>, changes: &mut Vec<Change>) -> Step {
         if let Some(reason) = self.stop {
@@ -248,7 +247,7 @@ impl Evolution {
         Step::Replace
     }
 
-    /// One death and one birth; false if no fly may die.
+    /// One death and one birth; returns false if no fly may die.
     fn give_birth(&mut self, lane: &Lane, marginal: &[i64], changes: &mut Vec<Change>) -> bool {
         let run = self.outcome.restarts;
         let mut stream = Stream::new(self.scheme.seed, Purpose::Birth, run, self.births_in_run);
@@ -268,7 +267,7 @@ impl Evolution {
         true
     }
 
-    /// Ends a run: the next one begins from the best population with cooler amplitudes, if any is left.
+    /// Ends a run. If a run is left, it begins from the best population with smaller mutation steps.
     fn end_run(&mut self, reason: StopReason, target: &Target) -> Step {
         let dry_stop = reason == StopReason::Dry && self.scheme.on_dry == OnDry::Stop;
         if dry_stop || self.outcome.restarts == self.scheme.restarts {
@@ -284,14 +283,14 @@ impl Evolution {
         }
         let (has_split, has_changed_masks) = (self.split(target), self.change_masks());
         if has_split || has_changed_masks {
-            // Populations of fewer flies or of other masks are not what the result is to be.
+            // Populations with fewer flies or other masks do not compare with those to come.
             self.best = None;
         }
         Step::Restart
     }
 
-    /// Mitosis, if it is time for it: twice as many flies live in the run that begins, their steps and first sides by Eq. 1
-    /// for that number.
+    /// Mitosis, if it is due: in the run that begins, twice as many flies live. Their steps and first sides follow from
+    /// Eq. 1 for that number.
     fn split(&mut self, target: &Target) -> bool {
         let run = self.outcome.restarts;
         if run > self.scheme.mitosis {
@@ -306,7 +305,7 @@ impl Evolution {
         true
     }
 
-    /// Gives every fly a mask of the run that begins, if its masks are others than those of the last.
+    /// Gives every fly a mask of the run that begins, if the masks differ from those of the run before.
     fn change_masks(&mut self) -> bool {
         let run = self.outcome.restarts;
         let layers = self.scheme.layers(run);
@@ -319,7 +318,7 @@ impl Evolution {
         true
     }
 
-    /// Takes in the changes that were made since the last call, and the global fitness that they led to.
+    /// Takes in the changes since the last call, and the global fitness that they led to.
     pub fn absorb(&mut self, changes: &[Change], sae: u64) {
         self.sae = Some(sae);
         let best = self.best.get_or_insert_with(|| BestPopulation::new(&self.flies, sae));
@@ -330,7 +329,7 @@ impl Evolution {
         if best.offer(&self.flies, sae) {
             self.births_at_best = self.births_in_run;
         }
-        // In a run that warms up it ends the run alone, which the next step does.
+        // While the evolution warms up, this ends only the run, in the next step.
         if self.has_reached_target() && !self.is_warming_up() {
             self.stop(StopReason::TargetSae);
         }

@@ -5,7 +5,7 @@ use crate::model::operators::{RandomFlies, Rotation, random_layer, scaled_tile_s
 use crate::model::rng::{Purpose, Stream};
 use crate::model::{Fly, Target};
 
-/// Random flies for a population of which `living` flies live at first, wearing `layers`.
+/// Random flies for a population of which `living` flies live at first. They wear the mask `layers`.
 pub(super) fn newcomers(
     scheme: &PaperScheme,
     (width_px, height_px): (u32, u32),
@@ -17,8 +17,8 @@ pub(super) fn newcomers(
     RandomFlies { width_px, height_px, side, rotation: scheme.rotation, layers }
 }
 
-/// The first population of a scheme: uniform random flies with sides by Eq. 1 (paper section 4), coloured by the scheme's
-/// rule. With mitosis only some live: they come first, and the rest are absent.
+/// The first population of a scheme: uniform random flies with sides by Eq. 1 (paper section 4), coloured by the
+/// scheme's rule. With mitosis only some live at first. They come first, and the rest are absent.
 #[must_use]
 pub fn first_population(scheme: &PaperScheme, target: &Target, fly_count: usize) -> Vec<Fly> {
     let living = scheme.living(0, fly_count);
@@ -29,7 +29,7 @@ pub fn first_population(scheme: &PaperScheme, target: &Target, fly_count: usize)
     flies
 }
 
-/// The first population of the paper's scheme with nothing but the defaults.
+/// The first population of the paper's scheme with its defaults.
 #[must_use]
 pub fn random_population(width_px: u32, height_px: u32, fly_count: usize, seed: u64) -> Vec<Fly> {
     let newcomers = newcomers(&PaperScheme::default(), (width_px, height_px), fly_count, &[]);
@@ -37,8 +37,8 @@ pub fn random_population(width_px: u32, height_px: u32, fly_count: usize, seed: 
     (0..fly_count as u64).map(fly).collect()
 }
 
-/// `flies`, from elsewhere, as a scheme begins from them: they wear its first masks if it names any, have colours of its
-/// palette if it has one, and lie straight if it turns no tiles. All else stays.
+/// Adapts `flies` from elsewhere to a scheme that begins from them. They wear its first masks if it names any, take
+/// colours of its palette if it has one, and lie straight if it turns no tiles. Everything else stays.
 #[must_use]
 pub fn begin_from(scheme: &PaperScheme, mut flies: Vec<Fly>) -> Vec<Fly> {
     for fly in flies.iter_mut().filter(|fly| fly.alive) {

@@ -1,52 +1,54 @@
-//! What of a sequence of pictures holds still, so that its tiles may: a target with hysteresis.
+//! Decides which pixels of a sequence of pictures hold still, so that their tiles can, too: a target with hysteresis.
 //!
-//! A pixel keeps its value while the pictures stay near it, as the mean of the latest ones, so noise moves no tile. Where a picture
-//! leaves that value, the pixel and its surroundings take the new one, and are free to be evolved for some frames. What is still is
-//! refined in turns: in each frame some squares are free, too.
+//! A pixel keeps its value, the mean of its latest pictures, while the pictures stay near it, so noise moves no tile.
+//! When a picture departs from that value, the pixel and its surroundings take the new value, and are free to be
+//! evolved for some frames. Still pixels are refined in turns: in each frame, some squares of them are free, too.
 //! Integers only; nothing here knows a file or a device.
 
 use crate::error::Result;
 use crate::model::{Mosaic, Rgb, Target};
 
-/// Frames for which a pixel that changed is free: that in which it changed, and those in which its tiles settle.
+/// Number of frames for which a changed pixel is free: the one in which it changed, and those in which its tiles
+/// settle.
 const FREE_FRAMES: u8 = 3;
 /// Side of the squares that are refined in turns, in px.
 const SQUARE_PX: usize = 32;
-/// Frames until a square has its turn again.
+/// Number of frames until a square has its turn again.
 const TURNS: usize = 4;
-/// Most frames that the mean of a pixel is over.
+/// Most frames in the mean of a pixel.
 const MEAN_FRAMES: u8 = 16;
-/// How far around a changed pixel others are free, too, in px: tiles that show there must be able to make room.
+/// Distance in px within which the pixels around a changed one are free, too, since tiles that show there must be able
+/// to make room.
 const MARGIN_PX: usize = 2;
-/// Half the side, without the middle, of the square whose mean difference tells a change from noise, in px.
+/// Half the side, without the middle, of the square whose mean difference distinguishes a change from noise, in px.
 const WINDOW_PX: usize = 2;
-/// A pixel alone tells a change where it differs by this many times the noise.
+/// A single pixel counts as changed if it differs by this many times the noise.
 const ALONE: i32 = 4;
 /// Largest noise.
 pub const NOISE_MAX: u32 = 63;
-/// Columns and rows of the squares that pictures are compared by to find cuts.
+/// Columns and rows of the squares by which pictures are compared to find cuts.
 const SQUARES: usize = 32;
 
-/// The pixels that a sequence is evolved towards, as they were last taken from a picture.
+/// The pixels that a sequence is evolved towards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Held {
     width_px: usize,
     height_px: usize,
     noise: i32,
-    /// Frames since the first.
+    /// Number of frames since the first one.
     frames: usize,
     /// The means, with 8 fractional bits.
     means_q8: Vec<[u16; 3]>,
-    /// Frames that each mean is over, at most [`MEAN_FRAMES`].
+    /// Number of frames in each mean, at most [`MEAN_FRAMES`].
     counts: Vec<u8>,
     transparent: Option<Vec<bool>>,
-    /// Frames since each pixel changed, at most [`FREE_FRAMES`].
+    /// Number of frames since each pixel changed, at most [`FREE_FRAMES`].
     ages: Vec<u8>,
 }
 
 impl Held {
-    /// Holds the first picture of a shot, which is evolved anew; later a mean difference of up to `noise`, 0 to [`NOISE_MAX`] of 255,
-    /// is no change.
+    /// Begins with the first picture of a shot, which is evolved anew. In later pictures a mean difference of up to
+    /// `noise`, 0 to [`NOISE_MAX`] of 255, does not count as a change.
     #[must_use]
     pub fn new(target: &Target, noise: u32) -> Self {
         Self {
@@ -64,7 +66,7 @@ impl Held {
     /// Goes on to the next picture.
     ///
     /// # Panics
-    /// If it is of another size.
+    /// If its size differs.
     pub fn advance(&mut self, target: &Target) {
         assert_eq!(target.pixels().len(), self.means_q8.len(), "the pictures of a shot have one size");
         let changed = widened(&self.changes(target), self.width_px);
@@ -96,7 +98,7 @@ impl Held {
     #[must_use]
     pub fn is_still(&self, pixel: usize) -> bool {
         let (column, row) = (pixel % self.width_px / SQUARE_PX, pixel / self.width_px / SQUARE_PX);
-        // Neighbours have their turns at other times.
+        // Neighbouring squares have their turns at different times.
         self.ages[pixel] >= FREE_FRAMES && !(column + 2 * row + self.frames).is_multiple_of(TURNS)
     }
 
@@ -108,8 +110,8 @@ impl Held {
         self.with_planes(self.colors().collect(), target)
     }
 
-    /// What the next frame is evolved towards: where the picture is still, what `shown`, the mosaic of the frame before, shows
-    /// there, so that to change it costs what it would flicker; elsewhere the picture that is held.
+    /// The target of the next frame. Where the picture is still, it is what `shown`, the mosaic of the frame before,
+    /// shows there, so that a change costs as much as it would flicker. Elsewhere it is the held picture.
     ///
     /// # Errors
     /// As [`Held::picture`].
@@ -136,7 +138,7 @@ impl Held {
         Ok(held)
     }
 
-    /// The pixels that tell a change.
+    /// The pixels that count as changed.
     fn changes(&self, target: &Target) -> Vec<bool> {
         let clear = |plane: Option<&[bool]>, pixel: usize| plane.is_some_and(|plane| plane[pixel]);
         let (old, new) = (self.transparent.as_deref(), target.transparent());
@@ -160,7 +162,7 @@ fn exact(color: Rgb) -> [u16; 3] {
     color.map(|channel| u16::from(channel) << 8)
 }
 
-/// Sum and number of the values in the window around each place, moved inwards where it would reach beyond the picture: a
+/// Sum and number of the values in the window around each place. At the border the window is moved inwards, since a
 /// smaller one would take noise for a change.
 fn window_sums(values: &[i32], width_px: usize) -> Vec<(i32, i32)> {
     let window = |middle: usize, size: usize| {
@@ -179,7 +181,7 @@ fn window_sums(values: &[i32], width_px: usize) -> Vec<(i32, i32)> {
     (0..values.len()).map(sum).collect()
 }
 
-/// The places with those around them.
+/// The places together with those around them.
 fn widened(places: &[bool], width_px: usize) -> Vec<bool> {
     let height_px = places.len() / width_px;
     let mut wide = vec![false; places.len()];
@@ -193,7 +195,7 @@ fn widened(places: &[bool], width_px: usize) -> Vec<bool> {
     wide
 }
 
-/// A picture in few squares, for comparison with its neighbours in a sequence.
+/// A picture reduced to a few squares, for comparison with its neighbours in a sequence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Glance {
     means: Vec<Rgb>,
@@ -215,10 +217,10 @@ impl Glance {
         Self { means: sums.into_iter().map(|(sum, count)| sum.map(|sum| (sum / count) as u8)).collect() }
     }
 
-    /// The mean difference of two pictures of one size per channel, 0 to 255, rounded down.
+    /// The mean difference per channel of two pictures of the same size, 0 to 255, rounded down.
     ///
     /// # Panics
-    /// If they have not the same number of squares.
+    /// If they do not have the same number of squares.
     #[must_use]
     pub fn difference(&self, other: &Self) -> u32 {
         assert_eq!(self.means.len(), other.means.len(), "the pictures have one size");

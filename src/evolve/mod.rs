@@ -6,9 +6,12 @@
 mod breeder;
 pub mod cells;
 pub mod color;
+pub mod ended;
 pub mod evolution;
 pub mod first;
 pub mod held;
+pub mod objective;
+pub mod observer;
 pub mod palette;
 pub mod restart;
 pub mod scheme;
@@ -17,12 +20,15 @@ mod showing;
 pub mod spread;
 pub mod style;
 
-/// Version of the algorithm: raised whenever the same picture, options and seed lead to another result.
+/// Version of the algorithm, for both schemes. Raise it whenever the same picture, options and seed lead to another
+/// result. It is in every key, so raising it makes every existing output out of date.
 pub const ALGORITHM_VERSION: u32 = 1;
 
 pub use color::{ColorMode, ColorRule};
+pub use ended::{Ended, Ending, Tally};
 pub use evolution::{Evolution, Outcome, Step, StopReason};
 pub use first::{begin_from, first_population};
+pub use observer::{Observer, Seen, Stage, Undisturbed};
 pub use palette::Palette;
 pub use scheme::{OnDry, PaperScheme};
 pub use spread::Spread;

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::model::rng::Stream;
 use crate::model::{Fly, Rgb};
 
-/// Most colours of a palette: few enough to look through for every birth, and as many as palette files have.
+/// Most colours of a palette: few enough to search for every birth, and as many as palette files can have.
 pub const PALETTE_COLORS_MAX: usize = 256;
 
 /// A palette of at least one 8-bit sRGB colour.
@@ -16,7 +16,7 @@ pub struct Palette {
 }
 
 impl Palette {
-    /// The palette of these colours, whose order breaks ties.
+    /// A palette of these colours. Their order breaks ties.
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are none, or more than [`PALETTE_COLORS_MAX`].
@@ -37,7 +37,7 @@ impl Palette {
         &self.colors
     }
 
-    /// The colour nearest to `color` by squared distance in 8-bit sRGB; of equally near ones the first.
+    /// The colour nearest to `color` by squared distance in 8-bit sRGB. Of equally near ones, the first.
     #[must_use]
     pub fn nearest(&self, color: Rgb) -> Rgb {
         let distance = |other: &Rgb| -> u32 {

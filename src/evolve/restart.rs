@@ -1,11 +1,11 @@
 //! The best population by global fitness: the start of every restart, and the result.
 //!
-//! It is kept from one change of masks or split of the flies to the next: populations from before are not what the result is
-//! to be, so a new best population begins there, whose error may be higher.
+//! When masks change or flies split, it begins anew, perhaps with a higher error, since populations from before the
+//! change are not of the kind that the result will be.
 
 use crate::model::Fly;
 
-/// The best population seen since it was begun, kept up to date without copying whole populations.
+/// The best population since it began, kept up to date without copying whole populations.
 #[derive(Clone, Debug)]
 pub struct BestPopulation {
     flies: Vec<Fly>,

@@ -20,16 +20,16 @@ pub enum OnDry {
     Stop,
 }
 
-/// Births of a run unless asked otherwise (Table 2).
+/// Default births of a run (Table 2).
 pub const PAPER_BIRTHS: u64 = 40_000;
 
-/// Parameters of the paper's scheme. By default those of Table 2: mutation 100 %, no crossover, one death and one birth a
-/// generation; all flies wear what they begin with.
+/// Parameters of the paper's scheme. The defaults are those of Table 2: mutation 100 %, no crossover, one death and one
+/// birth in each generation. All flies keep the masks that they begin with.
 ///
-/// What is at its default draws no random number, so parameters do not disturb each other.
+/// A parameter at its default draws no random number, so parameters do not affect each other.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PaperScheme {
-    /// Names every random number.
+    /// Decides every random number.
     pub seed: u64,
     /// Births of each run.
     pub births: u64,
@@ -41,13 +41,15 @@ pub struct PaperScheme {
     pub on_dry: OnDry,
     /// Ends a run after this many births without a better population.
     pub patience: Option<u64>,
-    /// Ends the evolution when the global fitness is at most this; before the last change of masks or split, only the run.
+    /// Ends the evolution when the global fitness is at most this. Before the last change of masks or split, it ends
+    /// only the run.
     pub target_sae: Option<u64>,
-    /// Births evaluated together in one generation; 1 is the paper.
+    /// Births evaluated together in one generation; 1 in the paper.
     pub batch_births: u32,
     /// Probability, in 1/65536, that a child mutates; otherwise it is a plain copy, or plainly crossed.
     pub mutation_q16: u32,
-    /// Probability, in 1/65536, that a child is the arithmetic crossover of two flies that help, rather than one's copy.
+    /// Probability, in 1/65536, that a child is the arithmetic crossover of two flies that help, rather than a copy of
+    /// one.
     pub crossover_q16: u32,
     /// Probability, in 1/65536, that a fresh random fly is born instead of a child (immigration).
     pub new_blood_q16: u32,
@@ -57,10 +59,10 @@ pub struct PaperScheme {
     pub rotation: Rotation,
     /// First sides over those of Eq. 1, in 1/65536 (Fig. 8c).
     pub tile_scale_q16: u32,
-    /// Mask layers that the flies wear in each run, all equally likely; runs beyond the last entry are as the last. An
+    /// Mask layers that the flies wear in each run, all equally likely. The last entry is also for all later runs. An
     /// empty entry names none: flies keep what they wear, and random ones wear the square.
     pub masks: Vec<Vec<u16>>,
-    /// Where colours come from (Fig. 6), and which there are.
+    /// Where colours come from (Fig. 6), and the palette.
     pub color: ColorRule,
 }
 
@@ -72,7 +74,8 @@ impl PaperScheme {
         self.masks.get(last.min(run as usize)).map_or(&[], Vec::as_slice)
     }
 
-    /// Whether masks change or flies split in a run after `run`: its populations are not yet what the result is to be.
+    /// Whether masks change or flies split in a run after `run`. Then its populations are not yet of the kind that the
+    /// result will be.
     #[must_use]
     pub fn is_warm_up(&self, run: u32) -> bool {
         let last_change = u32::try_from(self.masks.len()).unwrap_or(u32::MAX).saturating_sub(1).min(self.restarts);
@@ -82,8 +85,8 @@ impl PaperScheme {
         run < self.mitosis.min(self.restarts) || changes_masks
     }
 
-    /// Flies that live in `run`, of a population with room for `fly_count`: N / 2^mitosis, rounded up, and twice as many
-    /// after each split.
+    /// Flies that live in `run`, of a population with room for `fly_count`: N / 2^mitosis, rounded up, and twice as
+    /// many after each split.
     #[must_use]
     pub fn living(&self, run: u32, fly_count: usize) -> usize {
         let first = fly_count.div_ceil(1 << self.mitosis.min(MITOSIS_MAX));

@@ -3,7 +3,7 @@
 use super::scheme::OnDry;
 use crate::model::rng::Stream;
 
-/// Random flies looked at before the threshold is given up.
+/// How many random flies are tried before the threshold is given up.
 const TRIES: u32 = 50;
 
 /// The fly that a birth replaces.
@@ -13,7 +13,7 @@ pub enum Victim {
     Bad(u32),
     /// None was found; this is the lower of two random flies.
     Fallback(u32),
-    /// None was found, and no fallback was asked for.
+    /// None was found, and the scheme has no fallback.
     Dry,
 }
 

@@ -1,32 +1,32 @@
 //! What a tile would show: the target's colours at the pixels where it would be in front of all others.
 //!
-//! Read from the lists and tiles that the host keeps for every evaluator, so the blocks' size does not matter and all
-//! evaluators give the same colours.
+//! This is read from the lists and tiles that the host keeps for every evaluator. So the size of the blocks does not
+//! matter, and all evaluators give the same colours.
 
 use crate::model::blocks::index_of;
 use crate::model::mask::COVERAGE_THRESHOLD;
 use crate::model::{Lane, MaskSet, Rgb, Tile};
 
-/// Per channel how many pixels want each value of the tile's colour.
+/// For each channel, how many pixels want each value of the tile's colour.
 #[derive(Clone, Debug)]
 pub(super) struct Wanted {
     counts: [[u32; 256]; 3],
     pixel_count: u32,
 }
 
-/// The fly that is placed: its index, which is also that of the fly that it replaces, and its depth key.
+/// The fly that is placed: its index, which is also the index of the fly that it replaces, and its depth key.
 type Placed = (u32, u64);
 
 impl Wanted {
-    /// The colours that `tile` should have where it would show, were it to take the place of fly `index` with depth `key`;
-    /// if it shows nowhere, at all pixels that it covers; `None` if it covers none.
+    /// The colours that `tile` should have where it would show if it took the place of fly `index` with depth `key`. If
+    /// it shows nowhere, those at all pixels that it covers; `None` if it covers none.
     pub(super) fn by(lane: &Lane, index: u32, key: u64, tile: &Tile) -> Option<Self> {
         let showing = Self::over(lane, tile, Some((index, key)));
         let wanted = if showing.pixel_count > 0 { showing } else { Self::over(lane, tile, None) };
         (wanted.pixel_count > 0).then_some(wanted)
     }
 
-    /// The colours at the pixels that `tile` covers; only where it shows, if it is `placed` among others.
+    /// The colours at the pixels that `tile` covers. If it is `placed` among others, only those where it shows.
     fn over(lane: &Lane, tile: &Tile, placed: Option<Placed>) -> Self {
         let (target, masks) = (&lane.scene().target, &lane.scene().masks);
         let mut wanted = Self { counts: [[0; 256]; 3], pixel_count: 0 };
@@ -48,8 +48,8 @@ impl Wanted {
         wanted
     }
 
-    /// Adds a pixel of the target under a texel of this shade, which divides it: the shaded colour should fit. A texel
-    /// without any light fits every colour alike.
+    /// Adds a pixel of the target under a texel of this shade. The pixel is divided by the shade, since the shaded
+    /// colour should fit. A texel without any light fits every colour equally well.
     fn add(&mut self, color: Rgb, shade: u8) {
         let shade = u32::from(shade);
         if shade == 0 {
@@ -71,7 +71,7 @@ impl Wanted {
         })
     }
 
-    /// The median of each channel: the lower one of an even number.
+    /// The median of each channel; for an even number of values, the lower one.
     pub(super) fn median(&self) -> Rgb {
         let rank = (self.pixel_count - 1) / 2;
         self.counts.map(|counts| {
@@ -126,8 +126,8 @@ fn hide(lane: &Lane, list: &[u64], (index, key): Placed, area: &Area, hidden: &m
     }
 }
 
-/// The shade of `tile` at pixel `(i, j)`, which lies in its box; `None` where it has a hole or does not reach. A
-/// translucent texel counts from the coverage on from which an opaque one does.
+/// The shade of `tile` at pixel `(i, j)` of its box; `None` where it has a hole or does not reach. A translucent texel
+/// counts from the same coverage as an opaque one.
 fn shade_at(tile: &Tile, masks: &MaskSet, i: i32, j: i32) -> Option<u8> {
     let (u, v) = tile.coordinates(i, j);
     if u >= tile.u_end() || v >= tile.v_end() {
@@ -188,10 +188,10 @@ mod tests {
     #[test]
     fn only_pixels_that_no_nearer_tile_hides_count() {
         let flies = [columns(0, 3, 10), columns(6, 8, 30), columns(0, 8, 5)];
-        // In place of the last, columns 3 to 7 show: those of the second lie behind.
+        // In place of the last fly, columns 3 to 7 show, since those of the second lie behind.
         let child = columns(0, 8, 20);
         assert_eq!(wanted(&flies, 2, &child), Some(([50, 25, 200], [50, 25, 200])));
-        // In place of the first, nothing shows, so all that is covered counts; the median is the lower one.
+        // In place of the first fly, nothing shows, so all covered pixels count. The median is the lower one.
         assert_eq!(wanted(&flies, 0, &child), Some(([35, 18, 200], [30, 15, 200])));
     }
 

@@ -1,7 +1,7 @@
 //! How diverse a population is, gene by gene.
 //!
-//! Floats, since nothing is decided by them; the same on every machine, as they come from sums in a fixed order, roots,
-//! tables, and `libm`.
+//! These are floats, since they decide nothing. They are the same on every machine, since they come from sums in a
+//! fixed order, roots, tables, and `libm`.
 
 use crate::model::Fly;
 use crate::model::fly::{UNITS_PER_PX, Z_MAX, position_max};
@@ -10,11 +10,11 @@ use crate::model::tables::{TRIG_ONE, cos_sin};
 /// The spread of the living flies' genes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spread {
-    /// Index of Clark and Evans ("Distance to nearest neighbor as a measure of spatial relationships in populations",
-    /// Ecology 35, 1954) of the positions: the mean distance to the nearest neighbour over its expectation for random
-    /// positions. 1 is random, less is clustered, 0 is all in one place, more is regular, at most 2.15. The expectation is
-    /// corrected for the borders as by Donnelly (1978): `sqrt(A / N) / 2 + (0.0514 + 0.041 / sqrt(N)) * P / N` with area A
-    /// and perimeter P. `None` for fewer than two flies, or if the centres have no area to lie in.
+    /// Clark-Evans index ("Distance to nearest neighbor as a measure of spatial relationships in populations", Ecology
+    /// 35, 1954) of the positions: the mean distance to the nearest neighbour over its expectation for random
+    /// positions. 1 is random, less is clustered, 0 is all in one place, more is regular, at most 2.15. The expectation
+    /// is corrected for the borders as by Donnelly (1978): `sqrt(A / N) / 2 + (0.0514 + 0.041 / sqrt(N)) * P / N` with
+    /// area A and perimeter P. `None` for fewer than two flies, or if the centres have no area to lie in.
     pub clark_evans: Option<f64>,
     /// Standard deviation of the depth over that of uniform depths, range / sqrt(12).
     pub z: f64,
@@ -22,8 +22,8 @@ pub struct Spread {
     pub color: f64,
     /// Standard deviation of ln(sqrt(width * height)): 0.1 means that sizes differ by about 10 %.
     pub log_size: f64,
-    /// Circular variance of the angle, `1 - |mean of (cos, sin)|` (Mardia and Jupp, "Directional Statistics", 2000): 0 if
-    /// all are alike, 1 if they cancel out.
+    /// Circular variance of the angle, `1 - |mean of (cos, sin)|` (Mardia and Jupp, "Directional Statistics", 2000): 0
+    /// if all are alike, 1 if they cancel out.
     pub angle: f64,
 }
 
@@ -48,7 +48,7 @@ impl Spread {
     }
 }
 
-/// A variance as standard deviation, over that of uniform values of this range.
+/// A variance as a standard deviation, divided by that of uniform values in this range.
 fn of_uniform(variance: f64, range: f64) -> f64 {
     (variance * 12.0).sqrt() / range
 }
@@ -103,7 +103,7 @@ impl Grid {
         Self { cell, columns, rows, cells }
     }
 
-    /// For each position the distance to the nearest other one, in 1/64 px. There are at least two.
+    /// For each position the distance to the nearest other one, in 1/64 px. There must be at least two.
     fn nearest_distances(&self) -> impl Iterator<Item = f64> {
         let positions = (0..self.rows).flat_map(move |row| (0..self.columns).map(move |column| (column, row)));
         positions.flat_map(move |(column, row)| {
@@ -112,11 +112,12 @@ impl Grid {
         })
     }
 
-    /// Square of the distance from a position, the `number`-th of its cell, to the nearest other one, in rings of cells.
+    /// Square of the distance from a position, number `number` in its cell, to the nearest other one. Searches cells
+    /// ring by ring.
     fn nearest_square(&self, (x, y): (i64, i64), number: usize, (column, row): (i64, i64)) -> i64 {
         let mut nearest = i64::MAX;
         for ring in 0..=self.columns.max(self.rows) {
-            // What lies in this ring or beyond is at least as far as the ring's inner edge.
+            // Positions in this ring or beyond are at least as far away as the ring's inner edge.
             let reach = (ring - 1).max(0) * self.cell;
             if nearest <= reach * reach {
                 break;

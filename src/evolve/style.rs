@@ -1,7 +1,7 @@
 //! Styles of the cells search: named sets of bounds, penalties, masks and start.
 //!
-//! Lengths are multiples of d, the mean side of a tile (paper Eq. 1), so that a style looks alike at every size and number
-//! of tiles. All numbers are integers: they decide the picture.
+//! Lengths are multiples of d, the mean side of a tile (paper Eq. 1), so that a style looks alike at every size and
+//! number of tiles. All numbers are integers: they decide the picture.
 
 use crate::model::cells::Rules;
 use crate::model::cells::operators::PLACE_TOURNAMENT_MAX;
@@ -10,7 +10,7 @@ use crate::model::tables::size_factor_q16;
 use crate::model::tile::pack;
 use crate::model::{Blend, Rgb};
 
-/// Fixed-point one of lengths over d.
+/// The value 1 for lengths divided by d, in fixed point.
 const ONE_Q8: u32 = 256;
 
 /// Where the guide of a style comes from.
@@ -20,28 +20,28 @@ pub enum GuideKind {
     Edges,
     /// Directions that flow along the contours and on into flat areas, and sizes that follow the detail.
     Flow {
-        /// Over how many mean sides, in 1/256, directions are smoothed.
+        /// The distance over which directions are smoothed, in 1/256 of the mean side.
         smoothing_q8: u32,
         /// How much sizes follow the detail, 0 to 256.
         size_strength_q8: u32,
     },
 }
 
-/// What lies behind all tiles.
+/// The ground behind all tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Ground {
     /// Black, as in the paper.
     Black,
     /// The mean colour of the picture: a toned canvas.
     Mean,
-    /// The grout, between tiles as around them.
+    /// The grout, the same between tiles as within them.
     Grout,
 }
 
-/// A share of the tiles that have a size of their own.
+/// A class of tiles with their own size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ClassStyle {
-    /// Its share of the population, over 65,536; the last class takes the rest.
+    /// Its share of the population, in 1/65536. The last class takes the rest.
     pub share_q16: u32,
     /// Its side over d, in 1/256.
     pub scale_q8: u32,
@@ -49,22 +49,22 @@ pub struct ClassStyle {
     pub first_round: u32,
 }
 
-/// What makes a picture look as it does.
+/// The numbers that decide how a mosaic looks.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Style {
-    /// Smallest side over the tile's own, in 1/256.
+    /// Smallest side, divided by the side of the tile's class, in 1/256.
     pub side_min_q8: u32,
-    /// Largest side over the tile's own, in 1/256.
+    /// Largest side, divided by the side of the tile's class, in 1/256.
     pub side_max_q8: u32,
-    /// Largest ratio of the sides, in 1/256; 64 and more is any.
+    /// Largest ratio of the sides, in 1/256. A ratio of 64 or more means any.
     pub aspect_max_q8: u32,
-    /// Smallest side of a newborn tile over its own, in 1/256.
+    /// Smallest side of a newborn tile, divided by the side of its class, in 1/256.
     pub birth_min_q8: u32,
-    /// Largest side of a newborn tile over its own, in 1/256.
+    /// Largest side of a newborn tile, divided by the side of its class, in 1/256.
     pub birth_max_q8: u32,
     /// Whether the longer side of a newborn tile lies along the guide's direction, as a brush is drawn.
     pub is_stroke: bool,
-    /// What lies behind the tiles unless a colour is asked for.
+    /// The ground behind the tiles, unless a colour is asked for.
     pub ground: Ground,
     /// Cost of each further tile on a pixel.
     pub overlap: u32,
@@ -74,23 +74,23 @@ pub struct Style {
     pub turn: u32,
     /// Standard deviation of the angle of newborn tiles around the guide, in 1/65536 of a turn.
     pub angle_spread: u32,
-    /// Coherence from which newborn tiles always follow the guide, 0 to 255.
+    /// Newborn tiles always follow the guide where its coherence is at least this, 0 to 255.
     pub coherence: u32,
     /// Where directions and sizes come from.
     pub guide: GuideKind,
-    /// Width of the ring of grout over d, in 1/256; 0 is none.
+    /// Width of the ring of grout divided by d, in 1/256; 0 is none.
     pub grout_q8: u32,
-    /// Parts of the population with tiles of their own size, 1 to 4.
+    /// The classes of tiles, 1 to 4.
     pub classes: Vec<ClassStyle>,
-    /// Names of the masks that tiles wear unless others are asked for; none is the square.
+    /// Names of the masks that tiles wear by default. An empty list means the square.
     pub masks: Vec<String>,
-    /// Name of the shader that makes masks of their drawings.
+    /// Name of the shader that turns drawings into masks.
     pub shader: String,
     /// How the masks' coverage is read.
     pub blend: Blend,
     /// Opacity of whole translucent tiles, 1 to 255.
     pub opacity: u8,
-    /// Chance that a changed fly is recoloured too, over 65,536.
+    /// Chance that a changed fly is also recoloured, in 1/65536.
     pub recolor_q16: u32,
 }
 
@@ -98,7 +98,7 @@ impl Style {
     /// All names, the default first.
     pub const NAMES: [&'static str; 4] = ["free", "mosaic", "paint", "spray"];
 
-    /// The style of this name.
+    /// The style with this name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
@@ -202,8 +202,8 @@ impl Style {
         }
     }
 
-    /// The style for translucent tiles: without grout, and without what it costs to overlap or to leave holes, since such
-    /// tiles lie on each other and show what is behind them.
+    /// The style for translucent tiles. It has no grout and no penalties for overlaps or holes, since translucent tiles
+    /// lie on each other and show what is behind them.
     #[must_use]
     pub fn for_translucent_tiles(self) -> Self {
         Self { overlap: 0, hole: 0, grout_q8: 0, ..self }
@@ -212,7 +212,7 @@ impl Style {
     /// The rules of the style for `fly_count` tiles of the mean side `side` (1/64 px) over `background`, with grout of
     /// `grout_color`.
     #[must_use]
-    pub fn rules(&self, seed: u64, (side, fly_count): (u32, usize), background: Rgb, grout_color: Rgb) -> Rules {
+    pub fn rules(&self, seed: u64, side: u32, fly_count: usize, background: Rgb, grout_color: Rgb) -> Rules {
         let base = Rules::free(seed, side, fly_count, background);
         debug_assert!(base.births.place_tournament <= PLACE_TOURNAMENT_MAX, "draws of two purposes would coincide");
         let mut classes = base.classes;
@@ -249,7 +249,7 @@ impl Style {
     }
 }
 
-/// The natural logarithm of `value_q8` / 256 in steps of 1/256, as the table of size factors has it: the largest step whose
+/// The natural logarithm of `value_q8` / 256 in steps of 1/256, from the table of size factors: the largest step whose
 /// factor is at most the value.
 fn logarithm(value_q8: u32) -> i32 {
     let value_q16 = u64::from(value_q8) << 8;

@@ -2,43 +2,26 @@
 
 use std::sync::Arc;
 
-use super::compose_pass::ComposePass;
-use super::evaluate_pass::{EvaluatePass, KernelShape};
-use super::lane_buffers::{LaneSpan, Room};
+use super::evaluate::{EvaluatePass, KernelShape};
+use super::lane::{GpuLane, Unread, is_translucent};
+use super::lane_buffers::{Part, Room};
 use super::layout::Tile;
-use super::mosaic_pass::MosaicPass;
-use super::submission::Work;
-use super::translucent_pass::TranslucentPass;
+use super::translucent::{Extent, TranslucentPass};
+use super::work::Work;
 use crate::error::{Error, Remedy, Result};
-use crate::model::{Blend, Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Population, Scene};
-use crate::vk::{Buffer, Device, PassTime, Recorder, Timing};
+use crate::model::{Blend, Change, Evaluation, Evaluator, Fly, Lane, Layers, Scene};
+use crate::vk::{Device, PassTime, Recorder, Timing};
 
 /// The evaluator of a Vulkan device.
 pub struct GpuEvaluator {
     pub(super) device: Arc<Device>,
     pub(super) recorder: Recorder,
     pub(super) pass: EvaluatePass,
-    /// Only once a lane was translucent.
+    /// Made for the first translucent lane.
     pub(super) translucent: Option<TranslucentPass>,
-    /// By their numbers, without those that were released.
+    /// By number, without those that were released.
     pub(super) lanes: Vec<Option<GpuLane>>,
     pub(super) work: Work,
-}
-
-/// One lane: what the host keeps, where it lies on the device, and what the device last reported of it if it is opaque.
-pub(super) struct GpuLane {
-    pub lane: Lane,
-    pub span: LaneSpan,
-    pub sae: u64,
-    pub marginal: Vec<i64>,
-    pub unread: Unread,
-}
-
-/// The flies whose marginal fitness may not be what the device last reported.
-pub(super) enum Unread {
-    All,
-    /// Some of them more than once.
-    Some(Vec<u32>),
 }
 
 impl GpuEvaluator {
@@ -91,15 +74,6 @@ impl GpuEvaluator {
         self.recorder.pass_times()
     }
 
-    /// The fly that shows at each pixel as the graphics pass draws it, or [`crate::model::NO_FLY`].
-    ///
-    /// # Errors
-    /// If the device fails.
-    pub fn draw_fly_layer(&mut self, population: &Population) -> Result<Vec<u32>> {
-        let canvas = Canvas::evaluation(population.width_px, population.height_px);
-        MosaicPass::create(&self.device, &mut self.recorder, population, &canvas)?.draw_fly_layer(&mut self.recorder)
-    }
-
     /// Evaluates every lane once more from what is loaded: the device's part of [`Evaluator::load`], without binning.
     ///
     /// # Errors
@@ -120,8 +94,7 @@ impl GpuEvaluator {
     /// Makes a lane, if there is room for it.
     fn make_lane(&mut self, scene: Scene) -> Result<Option<usize>> {
         let side_px = self.pass.variant.shape.block_side_px;
-        let room = Room::of(std::iter::once(&scene), side_px);
-        if !self.pass.buffers.make_room(&mut self.recorder, &scene, room)? {
+        if !self.pass.buffers.make_room(&mut self.recorder, &scene, side_px)? {
             return Ok(None);
         }
         let scenes: Vec<&Scene> = self.lanes.iter().flatten().map(|lane| lane.lane.scene()).chain([&scene]).collect();
@@ -129,7 +102,7 @@ impl GpuEvaluator {
         self.pass.choose_variant(scenes.into_iter());
         self.make_room_for_translucent(&[&scene])?;
         let lane = Lane::new(scene, side_px);
-        let Some(span) = self.pass.buffers.place(&mut self.recorder, &lane)? else { return Ok(None) };
+        let span = self.pass.buffers.place(&mut self.recorder, &lane)?;
         if let Some(pass) = self.translucent.as_mut().filter(|_| is_translucent(&lane)) {
             pass.admit(span.number, &lane);
         }
@@ -141,29 +114,33 @@ impl GpuEvaluator {
         Ok(Some(span.number))
     }
 
-    /// Has room for the work of those of `more` that are translucent, beside the lanes that are there.
+    /// Makes room for the work of those of `more` that are translucent, beside the lanes that are there.
     fn make_room_for_translucent(&mut self, more: &[&Scene]) -> Result<()> {
-        let is_foggy = |scene: &&Scene| scene.masks.blend() == Blend::Translucent;
-        if !more.iter().any(is_foggy) {
+        let is_translucent = |scene: &&Scene| scene.masks.blend() == Blend::Translucent;
+        if !more.iter().any(is_translucent) {
             return Ok(());
         }
         let shape = self.pass.variant.shape;
-        let foggy: Vec<&Scene> = self.scenes().chain(more.iter().copied()).filter(is_foggy).collect();
-        let block_count = Room::of(foggy.iter().copied(), shape.block_side_px).pixels / shape.block_pixels();
-        let fly_count = foggy.iter().map(|scene| scene.fly_count).max().unwrap_or(0);
+        let all = self.scenes().chain(more.iter().copied());
+        let translucent: Vec<&Scene> = all.filter(is_translucent).collect();
+        let extent = Extent {
+            block_count: Room::of(translucent.iter().copied(), shape.block_side_px).pixels / shape.block_pixels(),
+            fly_count: translucent.iter().map(|scene| scene.fly_count).max().unwrap_or(0),
+        };
         match &mut self.translucent {
-            Some(pass) => pass.make_room(&self.device, block_count, fly_count),
+            Some(pass) => pass.make_room(&self.device, extent),
             None => {
-                self.translucent = Some(TranslucentPass::create(&self.device, shape, (block_count, fly_count))?);
+                self.translucent = Some(TranslucentPass::create(&self.device, shape, extent)?);
                 Ok(())
             }
         }
     }
 
     /// One layer of a lane, read back and put in rows.
-    fn read_back_layer(&mut self, lane: usize, layer: &Arc<Buffer>) -> Result<Vec<u32>> {
+    fn read_back_layer(&mut self, lane: usize, layer: Part) -> Result<Vec<u32>> {
         let span = self.known(lane).span;
-        let ticket = self.recorder.read_buffer(layer, span.first_pixel as u64 * 4, span.pixel_count as u64 * 4)?;
+        let range = self.pass.buffers.range(layer, &span);
+        let ticket = self.recorder.read_buffer(&range.buffer, range.offset, range.size_bytes)?;
         self.recorder.submit_and_wait()?;
         let mut blocked = vec![0_u32; span.pixel_count];
         self.recorder.read_into(&ticket, bytemuck::cast_slice_mut(&mut blocked))?;
@@ -177,11 +154,6 @@ impl GpuEvaluator {
         let pixels = (0..target.height_px()).flat_map(|j| (0..target.width_px()).map(move |i| (i, j)));
         Ok(pixels.map(|(i, j)| blocked[place(i, j)]).collect())
     }
-}
-
-/// Whether the lane's fitness is the work of [`TranslucentPass`].
-pub(super) fn is_translucent(lane: &Lane) -> bool {
-    lane.scene().masks.blend() == Blend::Translucent
 }
 
 impl Evaluator for GpuEvaluator {
@@ -202,8 +174,8 @@ impl Evaluator for GpuEvaluator {
     }
 
     fn release(&mut self, lane: usize) {
-        let Some(GpuLane { span, .. }) = self.lanes[lane].take() else { return };
-        self.pass.buffers.release(&span);
+        let Some(GpuLane { span, lane: released, .. }) = self.lanes[lane].take() else { return };
+        self.pass.buffers.release(&span, &released.scene().masks);
         if let Some(pass) = &mut self.translucent {
             pass.release(lane);
         }
@@ -215,9 +187,8 @@ impl Evaluator for GpuEvaluator {
         for &(number, flies) in populations {
             let GpuLane { lane, span, .. } = self.lanes[number].as_mut().expect("the lane was released");
             lane.load(flies);
-            let first_byte = (span.first_fly * size_of::<Tile>()) as u64;
-            let [tiles, _] = self.pass.buffers.flies();
-            self.recorder.write_buffer(tiles, first_byte, bytemuck::cast_slice(lane.tiles()))?;
+            let tiles = self.pass.buffers.range(Part::Tiles, span);
+            self.recorder.write_buffer(&tiles.buffer, tiles.offset, bytemuck::cast_slice(lane.tiles()))?;
         }
         self.evaluate_all(&populations.iter().map(|&(lane, _)| lane).collect::<Vec<_>>())
     }
@@ -228,9 +199,9 @@ impl Evaluator for GpuEvaluator {
             lane.replace(change.index, &change.fly);
             unread.add(std::iter::once(change.index));
             let tile = &lane.tiles()[change.index as usize];
-            let offset = (span.first_fly + change.index as usize) * size_of::<Tile>();
-            let [tiles, _] = self.pass.buffers.flies();
-            self.recorder.write_buffer(tiles, offset as u64, bytemuck::bytes_of(tile))?;
+            let tiles = self.pass.buffers.range(Part::Tiles, span);
+            let offset = tiles.offset + u64::from(change.index) * size_of::<Tile>() as u64;
+            self.recorder.write_buffer(&tiles.buffer, offset, bytemuck::bytes_of(tile))?;
         }
         self.evaluate_touched()
     }
@@ -244,17 +215,7 @@ impl Evaluator for GpuEvaluator {
     }
 
     fn read_back_layers(&mut self, lane: usize) -> Result<Layers> {
-        let [_, top, under, _] = self.pass.buffers.pixels().clone();
-        Ok(Layers { top: self.read_back_layer(lane, &top)?, under: self.read_back_layer(lane, &under)? })
-    }
-
-    fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
-        if population.masks.blend() == Blend::Translucent {
-            let pass = ComposePass::create(&self.device, &mut self.recorder, population, canvas, supersampling)?;
-            return pass.draw(&mut self.recorder, canvas, supersampling);
-        }
-        let samples = canvas.supersampled(supersampling);
-        let pass = MosaicPass::create(&self.device, &mut self.recorder, population, &samples)?;
-        pass.draw(&mut self.recorder, canvas, supersampling)
+        let top = self.read_back_layer(lane, Part::TopLayer)?;
+        Ok(Layers { top, under: self.read_back_layer(lane, Part::UnderLayer)? })
     }
 }

@@ -1,16 +1,15 @@
-//! The buffers that all lanes share, and where each lane lies in them. They grow as lanes come, up to the device's limits;
-//! what a lane leaves goes to the next.
+//! The buffers that all lanes of the evaluator share, and where each lane lies in them. Searches in cells have others,
+//! in `cells/buffers.rs`.
 
-use std::ops::Range;
+use std::iter;
 use std::sync::Arc;
 
 use super::layout::{LaneRecord, Tile};
-use super::slices::{Slice, Slices};
+use super::pools::{BufferRange, Growth, MASK_LAYER_BYTES, Needs, PartSpec, Pools, PoolsSpec, Slice};
 use crate::error::Result;
-use crate::model::mask::{TEXELS, Texel};
 use crate::model::tile::pack;
 use crate::model::{Lane, MaskSet, Scene};
-use crate::vk::{Buffer, BufferUse, Device, Recorder, Residence};
+use crate::vk::{Buffer, Device, Recorder};
 
 /// How much room lanes need together.
 #[derive(Clone, Copy, Debug, Default)]
@@ -31,233 +30,152 @@ impl Room {
             Self { lanes: lanes + 1, flies: flies + scene.fly_count, pixels }
         })
     }
+
+    /// Units of each pool.
+    fn units(self, mask_layers: usize) -> [u64; POOLS] {
+        [self.lanes, self.flies, self.pixels, mask_layers].map(|units| units as u64)
+    }
 }
+
+/// What a lane has a slice of.
+#[derive(Clone, Copy)]
+enum Pool {
+    Lanes,
+    Flies,
+    /// Pixels of all blocks.
+    Pixels,
+    /// Layers.
+    Masks,
+}
+
+const POOLS: usize = 4;
+
+/// The buffers.
+#[derive(Clone, Copy)]
+pub(super) enum Part {
+    /// Records of lanes.
+    Lanes,
+    /// The SAE of each lane.
+    Sums,
+    Tiles,
+    Marginal,
+    Targets,
+    TopLayer,
+    UnderLayer,
+    /// What each pixel added to the sums.
+    PixelParts,
+    Masks,
+}
+
+const fn part(name: &'static str, pool: Pool, unit_bytes: usize) -> PartSpec {
+    PartSpec { name, pool: pool as usize, unit_bytes }
+}
+
+/// All buffers, in the order of [`Part`].
+static PARTS: [PartSpec; Part::Masks as usize + 1] = [
+    part("lanes", Pool::Lanes, size_of::<LaneRecord>()),
+    part("sums", Pool::Lanes, 8),
+    part("tiles", Pool::Flies, size_of::<Tile>()),
+    part("marginal fitness", Pool::Flies, 8),
+    part("targets", Pool::Pixels, 4),
+    part("top layer", Pool::Pixels, 4),
+    part("under layer", Pool::Pixels, 4),
+    part("parts", Pool::Pixels, 4),
+    part("masks", Pool::Masks, MASK_LAYER_BYTES),
+];
 
 /// Where a lane lies in the shared buffers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LaneSpan {
     /// Index of the lane's record and of its SAE.
     pub number: usize,
-    pub first_fly: usize,
     pub fly_count: usize,
     pub first_pixel: usize,
     pub pixel_count: usize,
-    first_mask: usize,
+    slices: [Slice; POOLS],
 }
 
 impl LaneSpan {
-    /// Offset and size in bytes of the lane's marginal fitness.
-    pub fn marginal_bytes(&self) -> (u64, u64) {
-        (self.first_fly as u64 * 8, self.fly_count as u64 * 8)
-    }
-}
-
-/// Buffers with the same places: whoever has some has them in each.
-struct Pool<const COUNT: usize> {
-    places: Slices,
-    /// Name of each buffer, and the bytes of a place.
-    kinds: [(&'static str, usize); COUNT],
-    buffers: [Arc<Buffer>; COUNT],
-    users: usize,
-}
-
-impl<const COUNT: usize> Pool<COUNT> {
-    fn create(device: &Arc<Device>, kinds: [(&'static str, usize); COUNT], capacity: usize) -> Result<Self> {
-        let mut places = Slices::default();
-        places.grow(capacity as u64);
-        Ok(Self { places, kinds, buffers: create_all(device, kinds, capacity)?, users: 0 })
-    }
-
-    /// Grows until `count` neighbouring places are free; false if that is more than the device's buffers can have.
-    fn make_room(&mut self, recorder: &mut Recorder, count: usize) -> Result<bool> {
-        let missing = self.places.missing(count as u64) as usize;
-        if missing == 0 {
-            return Ok(true);
+    fn new(slices: [Slice; POOLS]) -> Self {
+        let [lane, flies, pixels, _] = slices;
+        Self {
+            number: lane.first as usize,
+            fly_count: flies.count as usize,
+            first_pixel: pixels.first as usize,
+            pixel_count: pixels.count as usize,
+            slices,
         }
-        let needed = self.capacity() + missing;
-        let device = Arc::clone(recorder.device());
-        let place_bytes = self.kinds.iter().map(|kind| kind.1).max().unwrap_or(1);
-        let capacity_max = device.info().limits.storage_buffer_bytes as usize / place_bytes;
-        // To the first alone the device itself says what is too large.
-        if needed > capacity_max && self.users > 0 {
-            return Ok(false);
-        }
-        let capacity = needed.max((2 * self.capacity()).min(capacity_max));
-        let buffers = create_all(&device, self.kinds, capacity)?;
-        if self.users > 0 {
-            let mut pass = recorder.transfer_pass("grow buffers of lanes")?;
-            for (from, to) in self.buffers.iter().zip(&buffers) {
-                pass.copy((from, 0), (to, 0), from.size_bytes());
-            }
-            drop(pass);
-            // The copy must not come after what is written next to where it lands.
-            recorder.submit_and_wait()?;
-        }
-        self.buffers = buffers;
-        self.places.grow(capacity as u64);
-        Ok(true)
     }
-
-    /// Places, free or not.
-    fn capacity(&self) -> usize {
-        self.places.capacity() as usize
-    }
-
-    fn take(&mut self, count: usize) -> Option<usize> {
-        let taken = self.places.take(count as u64)?;
-        self.users += 1;
-        Some(taken.first as usize)
-    }
-
-    fn give_back(&mut self, places: Range<usize>) {
-        self.places.give_back(Slice { first: places.start as u64, count: places.len() as u64 });
-        self.users -= 1;
-    }
-}
-
-fn create_all<const COUNT: usize>(
-    device: &Arc<Device>,
-    kinds: [(&'static str, usize); COUNT],
-    capacity: usize,
-) -> Result<[Arc<Buffer>; COUNT]> {
-    let buffers = kinds
-        .iter()
-        .map(|(name, bytes)| {
-            Buffer::create(device, name, (capacity * bytes) as u64, BufferUse::Storage, Residence::Device)
-        })
-        .collect::<Result<Vec<_>>>()?;
-    buffers.try_into().map_err(|_| crate::error::Error::Internal("a pool lost a buffer".to_owned()))
-}
-
-/// Masks on the device, for all lanes whose masks are the same.
-struct PlacedMasks {
-    set: Arc<MaskSet>,
-    layers: Range<usize>,
-    users: usize,
 }
 
 /// The buffers that all lanes share.
 pub(super) struct LaneBuffers {
-    /// Lane records, sums.
-    records: Pool<2>,
-    /// Tiles, marginal fitness.
-    flies: Pool<2>,
-    /// Targets, top layer, under layer, parts.
-    pixels: Pool<4>,
-    masks: Pool<1>,
-    mask_sets: Vec<PlacedMasks>,
+    pools: Pools<POOLS>,
 }
 
-const LAYER_BYTES: usize = size_of::<[Texel; TEXELS]>();
-
 impl LaneBuffers {
-    /// Creates buffers without lanes, with so much room.
+    /// Creates buffers without lanes that have `room`.
     pub fn create(device: &Arc<Device>, room: Room) -> Result<Self> {
-        Ok(Self {
-            records: Pool::create(device, [("lanes", size_of::<LaneRecord>()), ("sums", 8)], room.lanes)?,
-            flies: Pool::create(device, [("tiles", size_of::<Tile>()), ("marginal fitness", 8)], room.flies)?,
-            pixels: Pool::create(
-                device,
-                [("targets", 4), ("top layer", 4), ("under layer", 4), ("parts", 4)],
-                room.pixels,
-            )?,
-            masks: Pool::create(device, [("masks", LAYER_BYTES)], 0)?,
-            mask_sets: Vec::new(),
-        })
+        let spec = PoolsSpec { parts: &PARTS, masks: Part::Masks as usize };
+        Ok(Self { pools: Pools::create(device, spec, room.units(0))? })
     }
 
-    /// Grows until a lane of `scene` fits, which needs `room`; false if the device's buffers cannot. Buffers that grow are
-    /// others afterwards.
-    pub fn make_room(&mut self, recorder: &mut Recorder, scene: &Scene, room: Room) -> Result<bool> {
-        let layers = if self.placed(&scene.masks).is_some() { 0 } else { scene.masks.layers().len() };
-        Ok(self.records.make_room(recorder, room.lanes)?
-            && self.flies.make_room(recorder, room.flies)?
-            && self.pixels.make_room(recorder, room.pixels)?
-            && self.masks.make_room(recorder, layers)?)
+    /// Makes room for a lane of `scene` in blocks of `block_side_px`; false if it does not fit beside the other lanes.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::TooLarge`] if a lane without others does not fit,
+    /// [`crate::error::Error::OutOfDeviceMemory`] if the device has no memory left; or if the device fails.
+    pub fn make_room(&mut self, recorder: &mut Recorder, scene: &Scene, block_side_px: u32) -> Result<bool> {
+        let growth = match self.pools.is_empty() {
+            true => Growth::Alone,
+            false => Growth::Shared { bytes_max: u64::MAX },
+        };
+        self.pools.make_room(recorder, &needs(scene, block_side_px), growth)
     }
 
-    /// Gives `lane` its places, for which room was made, and uploads what never changes: its record, target and masks.
-    pub fn place(&mut self, recorder: &mut Recorder, lane: &Lane) -> Result<Option<LaneSpan>> {
+    /// Gives `lane` its slices, for which room was made, and uploads what never changes: its record, target and masks.
+    pub fn place(&mut self, recorder: &mut Recorder, lane: &Lane) -> Result<LaneSpan> {
         let scene = lane.scene();
-        let target = lane.blocked_target();
-        let (fly_count, pixel_count) = (scene.fly_count, target.len());
-        let Some(first_mask) = self.place_masks(recorder, &scene.masks)? else { return Ok(None) };
-        let (Some(number), Some(first_fly), Some(first_pixel)) =
-            (self.records.take(1), self.flies.take(fly_count), self.pixels.take(pixel_count))
-        else {
-            return Ok(None);
-        };
+        let slices = self.pools.take(recorder, &needs(scene, lane.lists().side_px()))?;
+        let first = |pool: Pool| slices[pool as usize].first as u32;
         let record = LaneRecord {
-            first_fly: first_fly as u32,
-            first_mask: first_mask as u32,
+            first_fly: first(Pool::Flies),
+            first_mask: first(Pool::Masks),
             background: pack(scene.background),
-            sum: number as u32,
+            sum: first(Pool::Lanes),
         };
-        let offset = (number * size_of::<LaneRecord>()) as u64;
-        recorder.write_buffer(self.lanes(), offset, bytemuck::bytes_of(&record))?;
-        recorder.write_buffer(&self.pixels.buffers[0], first_pixel as u64 * 4, bytemuck::cast_slice(&target))?;
-        Ok(Some(LaneSpan { number, first_fly, fly_count, first_pixel, pixel_count, first_mask }))
-    }
-
-    /// Takes a lane's places back.
-    pub fn release(&mut self, span: &LaneSpan) {
-        self.records.give_back(span.number..span.number + 1);
-        self.flies.give_back(span.first_fly..span.first_fly + span.fly_count);
-        self.pixels.give_back(span.first_pixel..span.first_pixel + span.pixel_count);
-        if let Some(place) = self.mask_sets.iter().position(|placed| placed.layers.start == span.first_mask) {
-            self.mask_sets[place].users -= 1;
-            if self.mask_sets[place].users == 0 {
-                self.masks.give_back(self.mask_sets.swap_remove(place).layers);
-            }
+        let target = lane.blocked_target();
+        for (part, bytes) in
+            [(Part::Lanes, bytemuck::bytes_of(&record)), (Part::Targets, bytemuck::cast_slice(&target))]
+        {
+            let range = self.pools.range(part as usize, &slices);
+            recorder.write_buffer(&range.buffer, range.offset, bytes)?;
         }
+        Ok(LaneSpan::new(slices))
     }
 
-    /// A number that rises whenever buffers are replaced by larger ones: what was bound before is not theirs.
+    /// Takes the slices of a lane with these masks back.
+    pub fn release(&mut self, span: &LaneSpan, masks: &Arc<MaskSet>) {
+        self.pools.give_back(&span.slices, masks);
+    }
+
+    /// Where a lane's slice lies in a buffer.
+    pub fn range(&self, part: Part, span: &LaneSpan) -> BufferRange {
+        self.pools.range(part as usize, &span.slices)
+    }
+
+    /// As [`Pools::version`].
     pub fn version(&self) -> usize {
-        let Self { records, flies, pixels, masks, .. } = self;
-        records.capacity() + flies.capacity() + pixels.capacity() + masks.capacity()
+        self.pools.version()
     }
 
-    /// First layer of masks with the same texels as `set`, which are uploaded unless a lane has them already.
-    fn place_masks(&mut self, recorder: &mut Recorder, set: &Arc<MaskSet>) -> Result<Option<usize>> {
-        if let Some(place) = self.placed(set) {
-            self.mask_sets[place].users += 1;
-            return Ok(Some(self.mask_sets[place].layers.start));
-        }
-        let Some(first) = self.masks.take(set.layers().len()) else { return Ok(None) };
-        for (layer, mask) in (first..).zip(set.layers()) {
-            let offset = (layer * LAYER_BYTES) as u64;
-            recorder.write_buffer(self.masks(), offset, bytemuck::cast_slice(mask.texels()))?;
-        }
-        let layers = first..first + set.layers().len();
-        self.mask_sets.push(PlacedMasks { set: Arc::clone(set), layers, users: 1 });
-        Ok(Some(first))
+    /// One of the buffers.
+    pub fn part(&self, part: Part) -> &Arc<Buffer> {
+        self.pools.part(part as usize)
     }
+}
 
-    fn placed(&self, set: &Arc<MaskSet>) -> Option<usize> {
-        // How texels are read is a matter of the kernel.
-        self.mask_sets.iter().position(|placed| Arc::ptr_eq(&placed.set, set) || placed.set.layers() == set.layers())
-    }
-
-    pub fn lanes(&self) -> &Arc<Buffer> {
-        &self.records.buffers[0]
-    }
-
-    pub fn sums(&self) -> &Arc<Buffer> {
-        &self.records.buffers[1]
-    }
-
-    /// Tiles and marginal fitness.
-    pub fn flies(&self) -> &[Arc<Buffer>; 2] {
-        &self.flies.buffers
-    }
-
-    /// Targets, top layer, under layer, and what each pixel added to the sums.
-    pub fn pixels(&self) -> &[Arc<Buffer>; 4] {
-        &self.pixels.buffers
-    }
-
-    pub fn masks(&self) -> &Arc<Buffer> {
-        &self.masks.buffers[0]
-    }
+fn needs(scene: &Scene, block_side_px: u32) -> Needs<'_, POOLS> {
+    let room = Room::of(iter::once(scene), block_side_px);
+    Needs { units: room.units(scene.masks.layers().len()), masks: &scene.masks }
 }

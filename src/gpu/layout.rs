@@ -18,7 +18,7 @@ pub struct LaneRecord {
     pub sum: u32,
 }
 
-/// `WorkItem` of `glsl/evaluate.comp`: one block of pixels and its list of tiles, or a piece of that list.
+/// `WorkItem` of `glsl/shared/block.glsl`: one block of pixels and its list of tiles, or a piece of that list.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct WorkItem {
@@ -53,10 +53,16 @@ pub const FLAG_UNFINISHED: u32 = 4;
 pub struct EvaluatePush {
     /// Number of work items.
     pub item_count: u32,
-    /// For re-rendering: the fly that is left out.
+}
+
+/// `Push` of `glsl/re_render.comp`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct ReRenderPush {
+    /// Number of work items.
+    pub item_count: u32,
+    /// The fly that is left out, and the number of its sum.
     pub left_out_fly: u32,
-    /// Added to the index of each lane's sum.
-    pub sum_offset: u32,
 }
 
 /// `StackItem` of `glsl/translucent.comp`: one block of pixels and its list of tiles, or a piece of the work on it.

@@ -2,27 +2,25 @@
 //!
 //! Each pass has a shader of the same stem in `glsl/` and a twin of the same stem in `cpu/`, and gives the same bits.
 
-mod cells_lanes;
-pub mod cells_layout;
-mod cells_pass;
-mod cells_pools;
-mod cells_search;
-mod cells_shape;
-mod cells_state;
-mod compose_pass;
-mod evaluate_pass;
+pub mod cells;
+mod compose;
+mod evaluate;
 mod evaluator;
+mod lane;
 mod lane_buffers;
 pub mod layout;
-mod mosaic_pass;
+mod mosaic;
+mod painter;
+mod pools;
 mod re_render;
 mod shaders;
-mod slices;
 mod submission;
-mod translucent_pass;
+mod translucent;
+mod work;
 
-pub use cells_lanes::VulkanLanes;
-pub use cells_search::VulkanSearch;
-pub use cells_shape::{CellForm, CellShape};
-pub use evaluate_pass::KernelShape;
+pub use cells::lanes::VulkanLanes;
+pub use cells::search::VulkanSearch;
+pub use cells::shape::{CellForm, CellShape};
+pub use evaluate::KernelShape;
 pub use evaluator::GpuEvaluator;
+pub use painter::GpuPainter;

@@ -1,10 +1,11 @@
 //! Marginal fitness the slow way, as in the paper: one re-render per fly with that fly left out. It is the baseline of
-//! `cargo bench --bench leave_one_out`.
+//! `cargo bench --bench leave_one_out`, and has a shader of its own so that the one that evaluates does not carry it.
 
 use super::GpuEvaluator;
-use super::evaluate_pass::{Mode, Variant, create_pipeline};
-use super::evaluator::GpuLane;
-use super::layout::EvaluatePush;
+use super::evaluate::create_kernel;
+use super::lane::GpuLane;
+use super::layout::ReRenderPush;
+use super::shaders;
 use crate::error::{Error, Remedy, Result};
 use crate::model::Evaluator;
 use crate::vk::{Buffer, BufferUse, Residence};
@@ -25,7 +26,7 @@ impl GpuEvaluator {
         let lists = lane.lists();
         let longest = (0..lists.block_count()).map(|block| lists.list(block).len()).max().unwrap_or(0);
         let entries: usize = (0..lists.block_count()).map(|block| lists.list(block).len()).sum();
-        if entries > self.pass.entry_capacity() || longest > super::evaluate_pass::LIST_PIECE {
+        if entries > self.pass.entry_capacity() || longest > super::evaluate::LIST_PIECE {
             let what = "re-rendering needs lists that fit a single dispatch".to_owned();
             return Err(Error::TooLarge { what, remedies: &[Remedy::FewerTiles] });
         }
@@ -35,14 +36,16 @@ impl GpuEvaluator {
 
         let bytes = u64::from(fly_count) * 8;
         let sums = Buffer::create(&self.device, "re-render sums", bytes, BufferUse::Storage, Residence::Device)?;
-        let pipeline = create_pipeline(&self.device, Variant { mode: Mode::ReRender, ..self.pass.variant })?;
+        let (constants, push_bytes) = (self.pass.variant.specialization(), size_of::<ReRenderPush>());
+        let pipeline = create_kernel(&self.device, "re_render", shaders::RE_RENDER, &constants, push_bytes)?;
         let group = self.pass.bind_with_sums(&pipeline, &sums)?;
         self.recorder.write_buffer(&sums, 0, &vec![0; bytes as usize])?;
         for first in (0..fly_count).step_by(RE_RENDERS_PER_SUBMISSION as usize) {
-            let mut pass = self.recorder.compute_pass("evaluate")?;
-            for fly in first..fly_count.min(first + RE_RENDERS_PER_SUBMISSION) {
-                let push = EvaluatePush { item_count, left_out_fly: fly, sum_offset: fly };
-                self.pass.dispatch(&mut pass, &pipeline, &group, push);
+            let mut pass = self.recorder.compute_pass("re_render")?;
+            pass.bind(&pipeline, &group);
+            for left_out_fly in first..fly_count.min(first + RE_RENDERS_PER_SUBMISSION) {
+                pass.push_constants(bytemuck::bytes_of(&ReRenderPush { item_count, left_out_fly }));
+                self.pass.dispatch(&mut pass, item_count);
             }
             drop(pass);
             self.recorder.submit_and_wait()?;

@@ -2,6 +2,8 @@
 
 /// Twin: `cpu/evaluate.rs`.
 pub(super) const EVALUATE: &[u8] = include_bytes!("../../spirv/evaluate.comp.spv");
+/// What only tests and benches compare with.
+pub(super) const RE_RENDER: &[u8] = include_bytes!("../../spirv/re_render.comp.spv");
 /// Twin: `cpu/mosaic.rs`.
 pub(super) const MOSAIC_VERTEX: &[u8] = include_bytes!("../../spirv/mosaic.vert.spv");
 /// Twin: `cpu/mosaic.rs`.

@@ -1,63 +1,15 @@
-//! The work of the evaluator: blocks whose lists become work items, as many submissions as they need, and the fitness that
-//! comes back.
+//! The work of the evaluator: the lists of blocks become work items, work items are submitted, and fitness is read
+//! back.
 
 use super::GpuEvaluator;
-use super::evaluate_pass::{LIST_PIECE, needs_wide_sums};
-use super::evaluator::{GpuLane, Unread, is_translucent};
+use super::evaluate::LIST_PIECE;
+use super::lane::{GpuLane, Unread, is_translucent};
+use super::lane_buffers::Part;
 use super::layout::{FLAG_CONTINUED, FLAG_FRESH, FLAG_UNFINISHED, WorkItem};
+use super::work::Pending;
 use crate::error::Result;
 use crate::model::blocks::index_of;
 use crate::vk::{ReadTicket, Recorder};
-
-/// Work for the device, in buffers that are used again.
-#[derive(Debug, Default)]
-pub(super) struct Work {
-    /// Blocks whose lists are still to be looked at from some entry on.
-    pending: Vec<Pending>,
-    items: Vec<WorkItem>,
-    entries: Vec<u32>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Pending {
-    lane: usize,
-    block: u32,
-    from: usize,
-}
-
-impl Unread {
-    /// Adds flies.
-    pub fn add(&mut self, more: impl Iterator<Item = u32>) {
-        if let Self::Some(flies) = self {
-            flies.extend(more);
-        }
-    }
-}
-
-impl GpuLane {
-    /// Takes in the marginal fitness of the flies that are unread, as bytes of 64-bit sums, and the SAE.
-    fn take_in(&mut self, marginal: &[u8], sae: u64) {
-        let is_wide = needs_wide_sums(self.lane.scene());
-        let (words, _) = marginal.as_chunks::<8>();
-        let number = |word: &[u8; 8]| {
-            let [low, high] = bytemuck::pod_read_unaligned::<[u32; 2]>(word);
-            // Of narrow sums only the low words count.
-            if is_wide { (u64::from(high) << 32 | u64::from(low)) as i64 } else { i64::from(low as i32) }
-        };
-        match &mut self.unread {
-            Unread::Some(flies) if flies.len() < words.len() => {
-                for fly in flies.drain(..) {
-                    self.marginal[fly as usize] = number(&words[fly as usize]);
-                }
-            }
-            unread => {
-                self.marginal.iter_mut().zip(words).for_each(|(place, word)| *place = number(word));
-                *unread = Unread::Some(Vec::new());
-            }
-        }
-        self.sae = if is_wide { sae } else { sae & u64::from(u32::MAX) };
-    }
-}
 
 impl GpuEvaluator {
     /// Evaluates all blocks of `lanes` afresh.
@@ -66,10 +18,10 @@ impl GpuEvaluator {
         for &number in lanes {
             let known = self.lanes[number].as_mut().expect("the lane was released");
             known.unread = Unread::All;
-            let (offset, bytes) = known.span.marginal_bytes();
-            let [_, marginal] = self.pass.buffers.flies();
-            zeroes.fill(marginal, offset, bytes, 0);
-            zeroes.fill(self.pass.buffers.sums(), number as u64 * 8, 8, 0);
+            for part in [Part::Marginal, Part::Sums] {
+                let sums = self.pass.buffers.range(part, &known.span);
+                zeroes.fill(&sums.buffer, sums.offset, sums.size_bytes, 0);
+            }
             let blocks = 0..known.lane.lists().block_count() as u32;
             self.work.pending.extend(blocks.map(|block| Pending { lane: number, block, from: 0 }));
         }
@@ -181,11 +133,10 @@ impl GpuEvaluator {
             let Some(known) = self.lanes[number].as_ref().filter(|known| !is_translucent(&known.lane)) else {
                 continue;
             };
-            let (offset, bytes) = known.span.marginal_bytes();
-            let [_, marginal] = pass.buffers.flies();
-            tickets.push((number, recorder.read_buffer(marginal, offset, bytes)?));
+            let marginal = pass.buffers.range(Part::Marginal, &known.span);
+            tickets.push((number, recorder.read_buffer(&marginal.buffer, marginal.offset, marginal.size_bytes)?));
         }
-        let sums = pass.buffers.sums();
+        let sums = pass.buffers.part(Part::Sums);
         let sums_ticket =
             if tickets.is_empty() { None } else { Some(recorder.read_buffer(sums, 0, sums.size_bytes())?) };
         recorder.submit_and_wait()?;

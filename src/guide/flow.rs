@@ -1,9 +1,10 @@
-//! The flowing field: strong contours keep their direction, and the areas between them take theirs from all around.
+//! The flowing field: strong contours keep their direction, and the areas between take theirs from the contours around
+//! them.
 //!
-//! Directions are vectors of twice their angle, so that opposite ones agree. The field `v` minimises
-//! `sum of w |v - u|^2 + lambda |gradient of v|^2`, where the contours say `u` with the weight `w`: where they say
-//! nothing, it is harmonic, and rows run on in parallel. Solved from coarse to fine by damped Jacobi sweeps, which leave
-//! no trace of the order of places.
+//! A direction is a vector with twice its angle, so opposite directions are equal. The contours ask for the vector `u`
+//! with the weight `w`, and the field `v` minimises `sum of w |v - u|^2 + lambda |gradient of v|^2`. Where there is no
+//! contour, the field is harmonic and rows of tiles continue in parallel. It is solved from coarse to fine by damped
+//! Jacobi sweeps, whose result does not depend on the order of places.
 
 use rayon::prelude::*;
 
@@ -11,9 +12,9 @@ use super::tensor::Tensors;
 
 /// Sweeps at each level of the pyramid.
 const SWEEPS: usize = 16;
-/// Share of a sweep's change that is made; all of it would leave a checkerboard.
+/// Share of a sweep's change that is applied; the whole change would leave a checkerboard.
 const DAMPING: f32 = 0.8;
-/// Rows that a task of a sweep takes.
+/// Rows per task of a sweep.
 const BAND_ROWS: usize = 64;
 
 /// Vectors on a grid.
@@ -25,7 +26,7 @@ pub(super) struct Field {
     pub vectors: Vec<[f32; 2]>,
 }
 
-/// What the contours say on a grid: sums of weighted vectors and of weights.
+/// What the contours ask for on a grid: sums of weighted vectors and of weights.
 struct Contours {
     columns: usize,
     rows: usize,
@@ -34,15 +35,15 @@ struct Contours {
 }
 
 impl Contours {
-    /// The contours of a picture; only how strong they are among each other matters.
+    /// The contours of a picture; only their strength relative to each other matters.
     fn of(tensors: &Tensors) -> Self {
         let count = tensors.trace.len();
         let strength = |place: usize| {
             let (x, y) = tensors.along(place);
             (x * x + y * y).sqrt()
         };
-        // Steepness is the root of the strength. Its mean, weighted by itself, is that of the contours, however
-        // little of the picture they take.
+        // Steepness is the root of the strength. Its mean, weighted by itself, is the typical steepness of contours,
+        // even if they take up little of the picture.
         let (mut strengths, mut steepness) = (0, 0);
         for strength in (0..count).map(strength) {
             strengths += libm::rint(strength) as i64;
@@ -62,13 +63,13 @@ impl Contours {
         contours
     }
 
-    /// The same on a grid of half as many columns and rows.
+    /// The same contours on a grid of half as many columns and rows.
     fn halved(&self) -> Self {
         let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
         let mut half = Self { columns, rows, pulls: Vec::new(), weights: Vec::new() };
         for y in 0..rows {
             for x in 0..columns {
-                // Opposite corners first: the sums of a turned picture are the turned sums.
+                // Opposite corners are added first, so that a turned picture has exactly the turned sums.
                 let corners = [(0, 0), (1, 1), (1, 0), (0, 1)].map(|(right, down)| {
                     let (x, y) = (2 * x + right, 2 * y + down);
                     let place = y * self.columns + x;
@@ -102,7 +103,7 @@ impl Contours {
         field
     }
 
-    /// One sweep over the rows from `first`; beyond the border the field goes on as it is there.
+    /// One sweep over the rows from `first`; beyond the border the outermost vectors repeat.
     fn sweep(&self, field: &Field, lambda: f32, first: usize, vectors: &mut [[f32; 2]]) {
         for (y, row) in (first..).zip(vectors.chunks_mut(self.columns)) {
             let line = |y: usize| &field.vectors[y * self.columns..][..self.columns];
@@ -122,7 +123,7 @@ impl Contours {
 }
 
 impl Field {
-    /// The field on a grid of about twice as many columns and rows, bilinear.
+    /// The field on a grid of about twice as many columns and rows, by bilinear interpolation.
     fn doubled(&self, columns: usize, rows: usize) -> Self {
         let mut vectors = Vec::with_capacity(columns * rows);
         let near = |place: usize, count: usize| {
@@ -148,9 +149,10 @@ impl Field {
 
 /// The field that flows along the contours of `tensors`, smoothed over about `smoothing` of their squares.
 ///
-/// With a stiffness of a sixteenth of its square, a contour as long as `smoothing` still bends the rows beside it.
+/// The stiffness is a sixteenth of the square of `smoothing`; a contour that is `smoothing` long then still bends the
+/// rows beside it.
 pub(super) fn flow(tensors: &Tensors, smoothing: f64) -> Field {
-    // Without any stiffness there would be no field where no contour is.
+    // Without any stiffness there would be no field where there is no contour.
     let smoothing = smoothing.max(0.25);
     Contours::of(tensors).follow((smoothing * smoothing / 16.0) as f32)
 }

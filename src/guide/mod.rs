@@ -1,8 +1,9 @@
-//! What guides a search for tiles: directions along the contours of a picture, and sizes that follow its detail.
+//! Computes the guide of a search: directions along the contours of a picture, and sizes of tiles that follow its
+//! detail.
 //!
 //! Every sum is an integer or a float in a fixed order, so that a picture has the same guide on every machine and with
-//! any number of threads. Time grows with the pixels alone. Devices read the [`Guide`] as a buffer; nothing here knows
-//! one.
+//! any number of threads. Time depends on the number of pixels alone. Devices read the [`Guide`] as a buffer; nothing
+//! here knows about devices.
 
 mod flow;
 mod sizes;
@@ -16,23 +17,24 @@ use crate::model::guide::{GUIDE_PX, Guide, GuideSample, SIZE_ONE};
 use sizes::Demand;
 use tensor::Tensors;
 
-/// What a [`flowing`] guide is wanted for.
+/// What a [`flowing`] guide shall be like.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flow<'a> {
-    /// Mean side of a tile in 1/64 px: contours finer than half of it do not count, and sizes change slowly over two.
+    /// Mean side of a tile in 1/64 px. Contours finer than half of it do not count, and sizes change slowly over two of
+    /// it.
     pub tile_side: u32,
-    /// Over how many 1/64 px the directions are smoothed; one to three sides of a tile look laid by hand.
+    /// Over how many 1/64 px the directions are smoothed. One to three sides of a tile make a mosaic look laid by hand.
     pub smoothing: u32,
-    /// How much sizes follow the detail, in 1/256: 0 keeps them equal, 256 evens out the error of tiles.
+    /// How much sizes follow the detail, in 1/256: 0 keeps them equal, 256 gives all tiles about the same error.
     pub size_strength_q8: u32,
-    /// How much each pixel's detail counts, row by row; 0 is 1. Without them all pixels count the same.
+    /// How much each pixel's detail counts, row by row; 0 counts as 1. `None` if all pixels count the same.
     pub weights: Option<&'a [u8]>,
 }
 
-/// The directions of the edges themselves, at a scale of two pixels; all sizes are 1.
+/// A guide with the directions of the edges themselves, at a scale of two pixels; all sizes are 1.
 #[must_use]
 pub fn sharp(target: &Target) -> Guide {
-    // Together with the square's own extent, which has a deviation of 1.12 px.
+    // Smoothing adds to the extent of the square itself, which has a deviation of 1.12 px.
     const DEVIATION: f64 = 1.5 / GUIDE_PX as f64;
     let tensors = Tensors::of(target).smoothed(DEVIATION);
     let sample = |place| {
@@ -43,10 +45,10 @@ pub fn sharp(target: &Target) -> Guide {
     guide(&tensors, sample)
 }
 
-/// Directions that flow along the contours, and on into flat areas, and sizes that follow the detail.
+/// A guide with directions that flow along the contours and on into flat areas, and sizes that follow the detail.
 ///
-/// Every place of a picture that has a contour at all has a direction; coherence fades with the distance from contours
-/// and where they contradict each other. The outermost [`GUIDE_PX`] px are taken for like those within.
+/// If the picture has any contour, every place has a direction. Coherence fades with the distance from contours and
+/// where contours contradict each other. The outermost [`GUIDE_PX`] px are replaced by the pixels next to them.
 ///
 /// # Panics
 /// If there are weights, but not one per pixel.
@@ -72,7 +74,7 @@ fn guide(tensors: &Tensors, sample: impl Fn(usize) -> GuideSample) -> Guide {
     Guide { columns: tensors.columns as u32, rows: tensors.rows as u32, samples }
 }
 
-/// Half the angle of a vector in 16 bits of a turn, below half a turn; 0 for the vector 0.
+/// Half the angle of a vector in 1/65536 of a turn, below half a turn; 0 for the vector 0.
 fn half_angle(x: f64, y: f64) -> u16 {
     let halves = libm::rint(libm::atan2(y, x) * (f64::from(1_u32 << 15) / std::f64::consts::TAU)) as i32;
     halves.rem_euclid(1 << 15) as u16

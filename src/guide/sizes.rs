@@ -1,25 +1,27 @@
-//! Sizes of tiles: small where there is detail, large where there is none, and filling the picture exactly once.
+//! Sizes of tiles: small where there is detail, large where there is none, and such that the tiles' areas add up to the
+//! picture's.
 //!
-//! Cells that approximate a picture of steepness g err least if their side goes with g^(-1/3): their error grows with
-//! g times the side, their number with the side's square.
+//! Tiles on a picture of local steepness g make the least error if their side is proportional to g^(-1/3): their error
+//! per pixel grows with g times the side, and their number falls with the square of the side.
 
 use super::smooth::smoothed;
 use super::tensor::Tensors;
 use crate::model::Target;
 use crate::model::guide::{GUIDE_PX, SIZE_ONE};
 
-/// Smallest side over the mean side, in units of 1/[`SIZE_ONE`]: 0.6.
+/// Smallest side relative to the mean side, in units of 1/[`SIZE_ONE`]: 0.6.
 const SIZE_MIN: u32 = (SIZE_ONE * 6).div_ceil(10);
-/// Largest side over the mean side: 1.7.
+/// Largest side relative to the mean side: 1.7.
 const SIZE_MAX: u32 = SIZE_ONE * 17 / 10;
-/// How far a size may lie from the middle one before the last smoothing; beyond it the bounds would only cut a cliff.
+/// How far a size may lie from the middle size before the last smoothing. The bounds would cut off larger deviations
+/// anyway, and leave a hard step.
 const REACH_OCTAVES: f64 = 0.8;
 /// Steps of the logarithm of a size per factor of two.
 const STEPS_PER_OCTAVE: f64 = 1024.0;
 
 /// How pixels are weighed, and how strongly sizes answer.
 pub(super) struct Demand<'a> {
-    /// Deviation of both smoothings, of the detail and of the sizes, in squares.
+    /// Deviation, in squares, with which both the detail and the sizes are smoothed.
     pub sigma: f64,
     /// The exponent of the detail, in 1/256 of a third.
     pub strength_q8: u32,
@@ -27,7 +29,8 @@ pub(super) struct Demand<'a> {
     pub weights: Option<&'a [u8]>,
 }
 
-/// Side over mean side of each square in units of 1/[`SIZE_ONE`]; `1 / size^2` has a mean of 1 over all pixels.
+/// For each square, the side of a tile relative to the mean side, in units of 1/[`SIZE_ONE`]; `1 / size^2` has a mean
+/// of 1 over all pixels.
 pub(super) fn sizes(target: &Target, tensors: &Tensors, demand: &Demand<'_>) -> Vec<u32> {
     let steps = steps(&details(target, tensors, demand), demand);
     let steps = smoothed(&steps, tensors.columns, demand.sigma);
@@ -41,13 +44,13 @@ pub(super) fn sizes(target: &Target, tensors: &Tensors, demand: &Demand<'_>) -> 
     steps.iter().map(|&step| table[(step - first) as usize]).collect()
 }
 
-/// How much detail is around each square, weighed; above 0, in a unit of its own.
+/// The weighted amount of detail around each square; above 0, in an arbitrary unit.
 fn details(target: &Target, tensors: &Tensors, demand: &Demand<'_>) -> Vec<f64> {
-    // 1/256 of a step of the root is far below what noise does.
+    // Rounding to 1/256 of the root changes far less than noise does.
     let steepness = |&trace: &i64| libm::rint(256.0 * (trace as f64).sqrt()) as i64;
     let steepness: Vec<i64> = tensors.trace.iter().map(steepness).collect();
     let steepness = smoothed(&steepness, tensors.columns, demand.sigma);
-    // Relative to the picture, so that its contrast does not matter.
+    // The floor is relative to the picture, so its contrast does not matter.
     let floor = mean(&steepness) / 16.0 + 1.0;
     let mut details: Vec<f64> = steepness.iter().map(|&steepness| steepness as f64 + floor).collect();
     if let Some(weights) = demand.weights {
@@ -58,7 +61,7 @@ fn details(target: &Target, tensors: &Tensors, demand: &Demand<'_>) -> Vec<f64> 
     details
 }
 
-/// The logarithm of the size that each detail asks for, from the middle one on, in [`STEPS_PER_OCTAVE`].
+/// The logarithm of the size that each detail asks for, relative to the middle size, in [`STEPS_PER_OCTAVE`].
 fn steps(details: &[f64], demand: &Demand<'_>) -> Vec<i64> {
     let factor = -f64::from(demand.strength_q8) / 256.0 / 3.0 * STEPS_PER_OCTAVE;
     let reach = (STEPS_PER_OCTAVE * REACH_OCTAVES) as i64;
@@ -95,8 +98,8 @@ fn mean_weights(target: &Target, weights: &[u8], columns: usize) -> Vec<i64> {
     means
 }
 
-/// The size of each step, from the number of pixels that have it: the same factor between neighbouring steps, within
-/// bounds, and as small as the picture's area allows.
+/// The size of each step, given the number of pixels that have it. Neighbouring steps differ by the same factor, within
+/// bounds, and all are as small as the picture's area allows.
 fn balanced(pixels: &[u64]) -> Vec<u32> {
     let sizes = |shift: i32| {
         let size = move |step: i32| {
@@ -111,7 +114,7 @@ fn balanced(pixels: &[u64]) -> Vec<u32> {
         let tiles: f64 = sizes.iter().zip(pixels).map(|(&size, &pixels)| area(size) * pixels as f64).sum();
         tiles <= pixels.iter().sum::<u64>() as f64
     };
-    // All steps are below the smallest size at the low end and above the largest at the high one.
+    // At the low end all steps are below the smallest size, at the high end all are above the largest.
     let (mut low, mut high) = (-(pixels.len() as i32) - 1024, 1024);
     while high - low > 1 {
         let middle = low + (high - low) / 2;

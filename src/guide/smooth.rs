@@ -1,5 +1,5 @@
-//! Smoothing by three boxes with fractional ends (Gwosdek et al. 2011), nearly a Gaussian, in time that does not grow
-//! with its width. Sums are integers, so that running sums are exact.
+//! Smoothing by three boxes with fractional ends (Gwosdek et al. 2011). It is nearly a Gaussian, and its time does not
+//! grow with the width. Sums are integers, so running sums are exact.
 
 /// Passes of a box.
 const PASSES: usize = 3;
@@ -8,7 +8,8 @@ const WEIGHT_ONE: i64 = 128;
 /// Widest box on one side of its middle: with values below 2^31, sums of 511 x 511 weighted values stay below 2^63.
 const RADIUS_MAX: usize = 254;
 
-/// A box: values up to `radius` away count fully, the next ones on both sides `end` of [`WEIGHT_ONE`].
+/// A box: values up to `radius` away have the weight [`WEIGHT_ONE`], and the next one on each side has the weight
+/// `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Extent {
     radius: usize,
@@ -16,7 +17,7 @@ struct Extent {
 }
 
 impl Extent {
-    /// The box that, passed three times, has the deviation `sigma`, or the widest one.
+    /// The box that has the deviation `sigma` after three passes, or the widest box.
     fn of(sigma: f64) -> Self {
         let variance = sigma * sigma / PASSES as f64;
         let radius = libm::floor(((12.0 * variance + 1.0).sqrt() - 1.0) / 2.0).min(RADIUS_MAX as f64);
@@ -34,8 +35,8 @@ impl Extent {
     }
 }
 
-/// The plane, its rows `columns` long, smoothed by a bell of deviation `sigma`; near the border by the part inside.
-/// Values are below 2^31.
+/// The plane with rows of `columns` values, smoothed by a bell of deviation `sigma`; near the border, by the part of
+/// the bell that lies inside. Values must be below 2^31.
 pub(super) fn smoothed(plane: &[i64], columns: usize, sigma: f64) -> Vec<i64> {
     let extent = Extent::of(sigma);
     let mut plane = plane.to_vec();
@@ -54,7 +55,7 @@ fn boxed(plane: &[i64], columns: usize, extent: Extent) -> Vec<i64> {
     let row = |y: usize| &plane[y * columns..][..columns];
     let shares: Vec<f64> = (0..columns).map(|x| 1.0 / extent.weight_inside(x, columns) as f64).collect();
     let mut result = Vec::with_capacity(plane.len());
-    // What the rows within the radius of one add up to; entered one row ahead.
+    // The sum of the rows within the radius of one; a row is added one step ahead.
     let mut inner = vec![0_i64; columns];
     let mut line = vec![0_i64; columns];
     for y in 0..extent.radius.min(rows) {

@@ -8,14 +8,14 @@ use crate::model::guide::GUIDE_PX;
 
 const SQUARE: usize = GUIDE_PX as usize;
 const CHANNELS: usize = 3;
-/// Scharr's weights of a pixel and of its two neighbours: the 3x3 gradient that errs least in direction.
+/// Scharr's weights of a pixel and of its two neighbours: the 3x3 gradient with the least error of direction.
 const MIDDLE: i32 = 10;
 const SIDE: i32 = 3;
 /// The trace of a square where every channel changes by one level per pixel, about what noise does.
 pub(super) const TRACE_OF_ONE_LEVEL: i64 =
     ((2 * (MIDDLE + 2 * SIDE)) as i64).pow(2) * (CHANNELS * SQUARE * SQUARE) as i64;
 
-/// Sums over pixels and channels of products of the gradient `(gx, gy)`, one of each per square of pixels.
+/// For each square of pixels, sums over pixels and channels of products of the gradient `(gx, gy)`.
 pub(super) struct Tensors {
     pub columns: usize,
     pub rows: usize,
@@ -53,8 +53,8 @@ impl Tensors {
         }
     }
 
-    /// The tensors with the outermost ring of squares as the next ring within: scans and exports often leave a dark line
-    /// along the border, which is no contour of the picture.
+    /// The tensors with the outermost ring of squares replaced by the ring within it. Scans and exports often leave a
+    /// dark line along the border, which is no contour of the picture.
     pub(super) fn without_frame(&self) -> Self {
         let inside = |place: usize, count: usize| if count > 2 { place.clamp(1, count - 2) } else { place };
         let plane = |plane: &[i64]| {
@@ -73,7 +73,7 @@ impl Tensors {
         }
     }
 
-    /// The tensors averaged over their surroundings by a bell of deviation `sigma`, in squares.
+    /// The tensors smoothed by a bell of deviation `sigma`, in squares.
     pub(super) fn smoothed(&self, sigma: f64) -> Self {
         let smooth = |plane: &[i64]| smoothed(plane, self.columns, sigma);
         Self {
@@ -91,19 +91,19 @@ impl Tensors {
         (-self.difference[place] as f64, -self.twice_mixed[place] as f64)
     }
 
-    /// Of the square at `place`: the share of its changes that have one direction, 0 to 1; small where there are hardly
-    /// any changes.
+    /// Of the square at `place`: the share of its changes that agree on a direction, 0 to 1; small where hardly
+    /// anything changes.
     pub(super) fn coherence(&self, place: usize) -> f64 {
         let (x, y) = self.along(place);
         (x * x + y * y).sqrt() / (self.trace[place] + TRACE_OF_ONE_LEVEL) as f64
     }
 }
 
-/// Products of gradients, summed over the rows of one row of squares; per channel value of a row.
+/// Products of gradients, summed over the pixel rows of one row of squares, for each channel value of a row.
 struct Gradients {
-    /// The rows before, at and after one, weighted for the gradient along x; the border repeats before and after.
+    /// A row and the rows before and after it, weighted for the gradient along x; the border repeats before and after.
     smooth: Vec<i32>,
-    /// The row after one less the row before it; the border repeats before and after.
+    /// The row after a row minus the row before it; the border repeats before and after.
     rise: Vec<i32>,
     /// `gx gx`, `gy gy` and `gx gy`.
     sums: [Vec<i32>; 3],
@@ -120,7 +120,7 @@ impl Gradients {
         self.sums.iter_mut().for_each(|sums| sums.fill(0));
     }
 
-    /// Adds the gradients of a row of pixels; beyond the picture its border repeats.
+    /// Adds the gradients of a row of pixels; beyond the picture, its border repeats.
     fn add_row(&mut self, target: &Target, y: usize) {
         let width = target.width_px() as usize;
         let last = target.height_px() as usize - 1;
@@ -150,7 +150,7 @@ impl Gradients {
         }
     }
 
-    /// Sums the squares; none exceeds 48 products of gradients up to 4,080, which fits 32 bits.
+    /// Sums the squares. No sum has more than 48 products of gradients up to 4,080, so it fits 32 bits.
     fn write(&self, squares: &mut [[i64; 3]]) {
         for (sum, values) in self.sums.iter().enumerate() {
             for (square, values) in squares.iter_mut().zip(values.chunks(SQUARE * CHANNELS)) {

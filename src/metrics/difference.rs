@@ -1,4 +1,4 @@
-//! Errors of channels: sums of absolute and of squared differences, in integers, and the means made of them.
+//! Errors of channels: integer sums of absolute and of squared differences, and the means that follow from them.
 
 /// The differences between two pictures, summed over all pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_and_means_are_those_of_hand() {
+    fn sums_and_means_match_those_computed_by_hand() {
         let difference = Difference::between(&[[10, 20, 30], [0, 255, 7]], &[[13, 20, 26], [0, 0, 7]]);
         assert_eq!(difference.sae(), 3 + 4 + 255);
         assert_eq!(difference.squares(), 9 + 16 + 65_025);
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn white_against_black_has_a_ratio_of_0_db_and_a_tenth_of_it_20_db() {
         assert_eq!(Difference::between(&[[255; 3]; 5], &[[0; 3]; 5]).psnr_db(), Some(0.0));
-        // One value of 100 is off by 255: a root mean square of 25.5.
+        // One value of 100 is off by 255, which makes a root mean square of 25.5.
         let mut other = [[0; 3]; 100];
         for pixel in &mut other[..3] {
             pixel[1] = 255;

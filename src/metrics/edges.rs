@@ -1,7 +1,7 @@
 //! How well edges are kept: those that Canny's detector (1986) finds in the luma of both pictures, matched within 2 px.
 //!
-//! The detector is that of `skimage.feature.canny` with sigma 1 and thresholds 0.1 and 0.2, operation by operation: on
-//! both sides of a sharp step the gradient is equally steep, so the last bit decides which side is the edge.
+//! The detector repeats `skimage.feature.canny` with sigma 1 and thresholds 0.1 and 0.2, operation by operation. The
+//! gradient is equally steep on both sides of a sharp step, so the last bit decides which side is the edge.
 
 use rayon::prelude::*;
 
@@ -11,7 +11,7 @@ use super::luma::{Plane, columns_around};
 const RADIUS: usize = 4;
 /// Taps of the smoothing.
 const TAPS: usize = 2 * RADIUS + 1;
-/// Least gradient of an edge that continues a steeper one; single precision, as in the original.
+/// Least gradient of an edge that continues a steeper one, in single precision as in scikit-image.
 const LOW: f32 = 0.1;
 /// Least gradient of an edge on its own.
 const HIGH: f64 = 0.2;
@@ -23,9 +23,9 @@ const BAND_ROWS: usize = 32;
 /// How well the edges of a reference are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeMatch {
-    /// Share of the picture's edge pixels that lie within 2 px of one of the reference's; 1 if neither has any.
+    /// Share of the picture's edge pixels within 2 px of an edge pixel of the reference; 1 if neither has any.
     pub precision: f64,
-    /// Share of the reference's edge pixels that lie within 2 px of one of the picture's; 1 if neither has any.
+    /// Share of the reference's edge pixels within 2 px of an edge pixel of the picture; 1 if neither has any.
     pub recall: f64,
 }
 
@@ -46,11 +46,11 @@ impl EdgeMatch {
     }
 }
 
-/// How sure it is that a pixel is one of an edge.
+/// How certain it is that a pixel belongs to an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Strength {
     None,
-    /// Only if the edge goes on to a pixel that is sure.
+    /// It belongs to an edge only if it is connected to a sure pixel.
     Weak,
     Sure,
 }
@@ -100,7 +100,7 @@ impl EdgeMap {
     }
 }
 
-/// The luma smoothed by a Gaussian; near the border, by the part of it that lies inside.
+/// The luma smoothed by a Gaussian; near the border, by the part of the Gaussian that lies inside.
 fn smoothed(luma: &Plane) -> Plane {
     let (width, height) = (luma.width, luma.height);
     let weights = gaussian();
@@ -169,7 +169,8 @@ impl Gradients {
         Self { width: smooth.width, rows_before, down, across, magnitude }
     }
 
-    /// Writes how sure each pixel of the band is to be one of an edge; the outermost rows and columns are left out.
+    /// Writes how certain it is that each pixel of the band belongs to an edge; the outermost rows and columns are left
+    /// out.
     fn thin(&self, strengths: &mut [Strength]) {
         let rows = self.magnitude.len() / self.width;
         for y in 1..rows - 1 {
@@ -180,8 +181,8 @@ impl Gradients {
         }
     }
 
-    /// How sure a pixel is to be one of an edge: not at all if the gradient is steeper on one of its sides, in the
-    /// direction of the gradient and interpolated between two neighbours.
+    /// How certain it is that a pixel belongs to an edge. It does not if the gradient is steeper next to it, before or
+    /// behind it along the direction of the gradient, interpolated between two neighbours.
     fn strength(&self, place: usize) -> Strength {
         let magnitude = self.magnitude[place];
         if magnitude < f64::from(LOW) {
@@ -203,7 +204,8 @@ impl Gradients {
     }
 }
 
-/// Makes weak pixels sure that are connected to sure ones, also by corners; the indices of all sure ones.
+/// Makes weak pixels sure if they are connected to sure ones, even if only by a corner. Returns the indices of all sure
+/// pixels.
 fn connect(strengths: &mut [Strength], width: usize) -> Vec<usize> {
     let mut places: Vec<usize> = (0..strengths.len()).filter(|&place| strengths[place] == Strength::Sure).collect();
     let mut done = 0;
@@ -262,7 +264,8 @@ mod tests {
 
     #[test]
     fn a_weak_edge_counts_only_where_it_continues_a_strong_one() {
-        // A smoothed step of one rises by 0.399 + 0.242, the Gaussian's middle weights, over two px: a gradient of 2.56.
+        // A smoothed step of one rises by 0.399 + 0.242, the Gaussian's middle weights, over two px: a gradient of
+        // 2.56.
         let step = |height: &dyn Fn(usize) -> f64| {
             let edges = EdgeMap::find(&plane(30, 70, |x, y| if x < 15 { 0.0 } else { height(y) }));
             let mut rows: Vec<usize> = edges.places.iter().map(|place| place / 30).collect();
@@ -309,7 +312,7 @@ mod tests {
         let found = EdgeMatch::between(&dot(&[55]), &dot(&[57, 66, 67, 99]));
         assert_eq!(found, EdgeMatch { precision: 0.5, recall: 1.0 });
         assert_eq!(found.f1(), 2.0 / 3.0);
-        // Neither do rows wrap: (9, 4) and (0, 5) are neighbours in memory only.
+        // Rows do not wrap: (9, 4) and (0, 5) are neighbours in memory only.
         assert_eq!(EdgeMatch::between(&dot(&[49]), &dot(&[50])).f1(), 0.0);
     }
 

@@ -1,10 +1,11 @@
-//! How much a sequence changes where its reference does not: flicker.
+//! Flicker: how much a sequence changes where its reference does not.
 
-/// What frames changed from one to the next, in sums of 8-bit channels.
+/// Sums of the changes of 8-bit channels from frame to frame.
 ///
-/// For frames `R` of the reference and `O` of the other: [`Flicker::still`] is the mean of `|O[t] - O[t-1]|` over the channels of all
-/// pixels of which no channel has `|R[t] - R[t-1]|` above a limit, and [`Flicker::compensated`] the mean of
-/// `|(O[t] - O[t-1]) - (R[t] - R[t-1])|` over all; both over all pairs of neighbouring frames.
+/// Let `R` be the frames of the reference and `O` those of the other sequence. A pixel is still if `|R[t] - R[t-1]|`
+/// exceeds a limit in none of its channels. [`Flicker::still`] is the mean of `|O[t] - O[t-1]|` over the channels of
+/// still pixels, and [`Flicker::compensated`] the mean of `|(O[t] - O[t-1]) - (R[t] - R[t-1])|` over all channels; both
+/// over all pairs of neighbouring frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flicker {
     still_sum: u64,
@@ -14,11 +15,11 @@ pub struct Flicker {
 }
 
 impl Flicker {
-    /// Takes in a frame and the one before, of the reference and of the other; a pixel is still where no channel of the reference
-    /// changes by more than `limit`.
+    /// Adds a pair of neighbouring frames of the reference and of the other sequence. A pixel is still if no channel of
+    /// the reference changes by more than `limit`.
     ///
     /// # Panics
-    /// If they have not the same number of pixels.
+    /// If the frames differ in their number of pixels.
     pub fn add(&mut self, reference: [&[[u8; 3]]; 2], other: [&[[u8; 3]]; 2], limit: u8) {
         let count = reference[0].len();
         assert!(reference[1].len() == count && other.iter().all(|one| one.len() == count), "frames have one size");
@@ -37,19 +38,20 @@ impl Flicker {
         }
     }
 
-    /// Mean absolute change per channel where the reference is still, 0 to 255; none if it is nowhere.
+    /// Mean absolute change per channel where the reference is still, 0 to 255; `None` if it is still nowhere.
     #[must_use]
     pub fn still(&self) -> Option<f64> {
         (self.still_count > 0).then(|| self.still_sum as f64 / self.still_count as f64)
     }
 
-    /// Share of the pixels that are still, 0 to 1; none if there is no pair of frames.
+    /// Share of the pixels that are still, 0 to 1; `None` if there is no pair of frames.
     #[must_use]
     pub fn still_share(&self) -> Option<f64> {
         (self.count > 0).then(|| self.still_count as f64 / self.count as f64)
     }
 
-    /// Mean absolute difference per channel of the changes of both, 0 to 510; none if there is no pair of frames.
+    /// Mean absolute difference per channel between the changes of both sequences, 0 to 510; `None` if there is no pair
+    /// of frames.
     #[must_use]
     pub fn compensated(&self) -> Option<f64> {
         (self.count > 0).then(|| self.compensated_sum as f64 / self.count as f64)

@@ -1,5 +1,5 @@
-//! Gradient-magnitude similarity of luma and its deviation (GMSD, Xue et al. 2014): mean of 2x2 px, every second pixel,
-//! Prewitt, c = 170.
+//! Gradient-magnitude similarity of luma and its deviation (GMSD, Xue et al. 2014): means of 2x2 px, of which every
+//! second one is kept, then Prewitt's gradient and c = 170.
 
 use super::luma::{Plane, columns_around};
 
@@ -42,7 +42,7 @@ pub(super) fn magnitudes(luma: &Plane) -> Vec<f64> {
     magnitudes
 }
 
-/// Every second pixel of the means of each pixel with those to its left, above, and left above.
+/// Every second pixel along both axes, as the mean of itself and its neighbours to the left, above, and above left.
 fn halved(luma: &Plane) -> Plane {
     let (width, height) = (luma.width.div_ceil(2), luma.height.div_ceil(2));
     let mut values = Vec::with_capacity(width * height);
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn the_similarity_of_a_step_to_black_is_that_of_hand() {
+    fn the_similarity_of_a_step_to_black_matches_the_one_computed_by_hand() {
         let similarity = GradientSimilarity::between(&magnitudes(&step()), &[0.0; 16]);
         let (weak, strong) = (170.0 / (127.5 * 127.5 + 170.0), 170.0 / (255.0 * 255.0 + 170.0));
         let mean = (1.0 + 2.0 * weak + strong) / 4.0;

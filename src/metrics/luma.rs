@@ -15,7 +15,7 @@ pub(super) struct Plane {
 impl Plane {
     /// Luma of a picture, 0 to 1.
     ///
-    /// The order of the operations is that of numpy's product of matrix and vector on x86-64 with AVX-512: where two
+    /// Operations have the same order as in numpy's product of matrix and vector on x86-64 with AVX-512. Where two
     /// pixels of an edge are equally steep, the last bit decides which of them Canny keeps.
     pub(super) fn luma(picture: &Picture<'_>) -> Self {
         let luma = |pixel: &[u8; 3]| {

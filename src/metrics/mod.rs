@@ -1,8 +1,8 @@
 //! How alike two pictures are: errors of channels, structure, gradients, edges.
 //!
-//! All figures are of stored 8-bit sRGB, and are defined as in numpy, scipy 1.17 and scikit-image 0.26, so that others
-//! can recompute them. Works on borrowed pixels: knows no fly, no file and no device. Floats only, since nothing that
-//! evolves depends on them; they are the same with any number of threads.
+//! All figures are computed from stored 8-bit sRGB and defined as in numpy, scipy 1.17 and scikit-image 0.26, so others
+//! can recompute them. They may be floats, since no evolution depends on them; the number of threads does not change
+//! them. Works on borrowed pixels: knows no fly, no file and no device.
 
 mod difference;
 mod edges;
@@ -19,7 +19,7 @@ pub use gradient::GradientSimilarity;
 use edges::EdgeMap;
 use luma::Plane;
 
-/// Least side in px of a picture that is scored: that of the window of the structural similarity.
+/// Least side in px of a picture that can be scored: the side of the window of the structural similarity.
 pub const SIDE_MIN_PX: u32 = similarity::WINDOW_PX as u32;
 
 /// The pixels of a picture: 8-bit sRGB, row by row from the top.
@@ -55,7 +55,7 @@ pub struct Reference<'a> {
 }
 
 impl<'a> Reference<'a> {
-    /// Prepares a picture to be compared with.
+    /// Prepares a picture that others are compared with.
     ///
     /// # Errors
     /// A sentence without the file's name if a side is below [`SIDE_MIN_PX`].

@@ -1,4 +1,4 @@
-//! Structural similarity (Wang et al. 2004), as `skimage.metrics.structural_similarity` has it by default: a uniform
+//! Structural similarity (Wang et al. 2004), with the defaults of `skimage.metrics.structural_similarity`: a uniform
 //! window of 7x7 px that lies inside the picture, sample covariance, mean over the channels.
 
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ pub(super) fn mean(one: &Picture<'_>, other: &Picture<'_>) -> f64 {
     channels.iter().sum::<f64>() / 3.0
 }
 
-/// Sums over the pixels of a column or of a window: x, y, x², y², xy; 32 bits hold those of a window many times over.
+/// Sums over the pixels of a column or of a window: x, y, x², y², xy; those of a window fit 32 bits many times over.
 #[derive(Clone, Copy, Default)]
 struct Sums([u32; 5]);
 
@@ -38,7 +38,7 @@ impl Sums {
         Self(std::array::from_fn(|i| self.0[i] - other.0[i]))
     }
 
-    /// The similarity of what a window shows.
+    /// The similarity of the two pictures within a window.
     fn similarity(self) -> f64 {
         let [x, y, xx, yy, xy] = self.0.map(f64::from);
         let means = |product: f64| product / (COUNT * COUNT);

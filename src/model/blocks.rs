@@ -1,7 +1,8 @@
-//! Per block of pixels, the list of the tiles whose boxes touch it, nearest first.
+//! For each block of pixels, the list of the tiles whose boxes touch it, nearest first.
 //!
-//! Both evaluators read these lists, so that a pixel meets its tiles in depth order: the first that covers it is its
-//! top, the second its under. A birth changes only the lists of the blocks that its two boxes touch.
+//! Both evaluators read these lists, so a pixel meets its tiles in depth order: the first that covers it is its top,
+//! the second its under. A birth changes only the lists of the blocks that the boxes of the dead fly and of the child
+//! touch.
 
 use super::fly::Fly;
 use super::mosaic::Patch;
@@ -33,7 +34,7 @@ pub fn depth_order(flies: &[Fly]) -> Vec<u64> {
 
 impl BlockLists {
     /// Empty lists for the blocks of `side_px` x `side_px` px that cover `canvas`; blocks at the right and lower edges
-    /// may hang over.
+    /// may reach beyond it.
     #[must_use]
     pub fn new(canvas: &Canvas, side_px: u32) -> Self {
         let (columns, rows) = (canvas.width_px.div_ceil(side_px), canvas.height_px.div_ceil(side_px));
@@ -73,7 +74,7 @@ impl BlockLists {
         (block % self.columns * self.side_px, block / self.columns * self.side_px)
     }
 
-    /// The part of `canvas`, whose blocks these are, that `block` covers.
+    /// The part of `canvas` that `block` covers. It must be the canvas that these lists were made for.
     #[must_use]
     pub fn patch(&self, block: usize, canvas: &Canvas) -> Patch {
         let (x, y) = self.origin(block);
@@ -81,7 +82,7 @@ impl BlockLists {
         Patch { x, y, width_px, height_px }
     }
 
-    /// Lists of a whole population, replacing what was there.
+    /// Replaces all lists by those of a whole population.
     pub fn fill(&mut self, flies: &[Fly], tiles: &[Tile]) {
         self.lists.iter_mut().for_each(Vec::clear);
         for key in depth_order(flies) {

@@ -1,10 +1,7 @@
-//! What an evaluator answers: global and marginal fitness, layers, and the drawn mosaic.
+//! The interface of an evaluator: global and marginal fitness, and layers.
 
 use super::fly::Fly;
 use super::lane::{Lane, Scene};
-use super::mosaic::Mosaic;
-use super::population::Population;
-use super::tile::Canvas;
 use crate::error::Result;
 
 /// No fly: the background shows.
@@ -30,24 +27,24 @@ pub struct Evaluation<'a> {
     pub marginal: &'a [i64],
 }
 
-/// Per pixel, row by row, the two nearest flies that cover it, or [`NO_FLY`]. A translucent fly covers a pixel where its
-/// coverage is above 0.
+/// Per pixel, row by row, the two nearest flies that cover it, or [`NO_FLY`]. A translucent fly covers a pixel where
+/// its coverage is above 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers {
-    /// The fly that shows, or of translucent ones the nearest that does.
+    /// The fly that shows; among translucent flies, the nearest one that shows.
     pub top: Vec<u32>,
-    /// The fly that would show without the top one, or of translucent ones the next.
+    /// The fly that would show without the top one; among translucent flies, the next one.
     pub under: Vec<u32>,
 }
 
-/// Evaluates the populations of several pictures (lanes) at once, exactly, and draws them.
+/// Evaluates the populations of several pictures (lanes) at once, exactly.
 ///
-/// Every implementation gives the same numbers and the same pixels.
+/// Every implementation gives the same numbers.
 pub trait Evaluator: Send {
     /// What the host keeps of `lane`: its scene, and the tiles and block lists of the loaded population.
     ///
     /// # Panics
-    /// If there is no such lane, here and wherever one is named.
+    /// If there is no such lane. This holds for every method that names one.
     fn lane(&self, lane: usize) -> &Lane;
 
     /// What stays the same while `lane` evolves.
@@ -58,17 +55,17 @@ pub trait Evaluator: Send {
     /// Number of lanes.
     fn lane_count(&self) -> usize;
 
-    /// Makes a lane for `scene`, empty until it is loaded, and returns its number: the lowest that no lane has. None if there
-    /// is no room beside the lanes that are there.
+    /// Adds a lane for `scene`, which is empty until it is loaded. Returns the lowest free lane number, or `None` if
+    /// there is no room beside the other lanes.
     ///
     /// # Errors
-    /// If there is no room for it alone, or the device fails.
+    /// If the scene does not fit even alone, or the device fails.
     fn admit(&mut self, scene: Scene) -> Result<Option<usize>>;
 
-    /// Takes away a lane; its number and its room are free for another.
+    /// Removes a lane; its number and its room are free for another.
     fn release(&mut self, lane: usize);
 
-    /// Loads whole populations into lanes and evaluates these lanes afresh, in one dispatch.
+    /// Loads whole populations into lanes and evaluates these lanes in one dispatch.
     ///
     /// # Errors
     /// If the device fails.
@@ -88,10 +85,4 @@ pub trait Evaluator: Send {
     /// # Errors
     /// If the device fails.
     fn read_back_layers(&mut self, lane: usize) -> Result<Layers>;
-
-    /// Draws a population on `canvas` with `supersampling`² samples per pixel.
-    ///
-    /// # Errors
-    /// If the device fails, or has no memory for the population.
-    fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic>;
 }

@@ -1,13 +1,13 @@
 //! A fly: nine genes as integers, and their bounds (paper section 4, Fig. 2).
 //!
-//! Integer genes make mutation and baking give the same bits everywhere. The floats that people see exist only at the
-//! rim: [`Genes`] converts to and from them, exactly for every value a gene can have.
+//! Integer genes make mutation and baking give the same bits everywhere. Floats exist only where people and files see
+//! them: [`Genes`] holds them, and every value of a gene survives the way there and back.
 
 /// Units of position and side per pixel: genes count 1/64 px.
 pub const UNITS_PER_PX: u32 = 64;
 /// Smallest side of a tile: 1/4 px.
 pub const SIDE_MIN: u32 = UNITS_PER_PX / 4;
-/// Largest side of a tile: 4,096 px; with it every pixel test fits in 32 bits.
+/// Largest side of a tile: 4,096 px; up to it, every pixel test fits 32 bits.
 pub const SIDE_MAX: u32 = 4096 * UNITS_PER_PX;
 /// Largest depth: z has 24 bits, smaller is nearer the eye.
 pub const Z_MAX: u32 = (1 << 24) - 1;
@@ -77,7 +77,7 @@ impl Fly {
         (u64::from(self.z) << 32) | u64::from(index)
     }
 
-    /// The fly with every gene moved to the nearest bound it exceeds, for a picture of `width_px` x `height_px`.
+    /// The fly with every gene clamped to its bounds in a picture of `width_px` x `height_px`.
     #[must_use]
     pub fn clamped(mut self, width_px: u32, height_px: u32) -> Self {
         self.x = self.x.clamp(0, position_max(width_px));

@@ -1,24 +1,24 @@
-//! A guide: along which direction, and how large, tiles should lie at each place of a picture.
+//! A guide: the direction and the size that tiles should have at each place of a picture.
 //!
-//! Plain samples on a coarse grid, which the twin and a device read alike. The module of the same name outside `model`
-//! derives them.
+//! It is plain samples on a coarse grid, which the twin and a device read alike. The module `crate::guide` computes
+//! them.
 
 /// Side in px of the square of pixels that one sample stands for.
 pub const GUIDE_PX: u32 = 4;
 /// [`GuideSample::size_q12`] of a tile as large as the mean.
 pub const SIZE_ONE: u32 = 1 << 12;
 
-/// What a guide says of one square of pixels. In a buffer of a device two words: direction in the lower half of the
-/// first and coherence in its upper half, then the size.
+/// What a guide says about one square of pixels. On a device it is two words: the lower half of the first is the
+/// direction and the upper half the coherence; the second is the size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct GuideSample {
-    /// Direction along the contour in 16 bits of a turn, from +x towards +y; below half a turn, as opposite directions
-    /// are one. 0 where there is none.
+    /// Direction along the contour in 16 bits of a turn, from +x towards +y; below half a turn, since opposite
+    /// directions are the same. 0 where there is none.
     pub direction: u16,
-    /// How sure the direction is: 0 where nothing tells one, 255 on a strong, clean edge.
+    /// How sure the direction is: 0 where there is none, 255 on a strong, clean edge.
     pub coherence: u16,
-    /// Side of a tile here over the mean side, in units of 1/[`SIZE_ONE`].
+    /// The side of a tile here, divided by the mean side, in units of 1/[`SIZE_ONE`].
     pub size_q12: u32,
 }
 
@@ -34,7 +34,7 @@ pub struct Guide {
 }
 
 impl Guide {
-    /// The sample of the square that holds pixel `(x_px, y_px)`; beyond the picture, the nearest.
+    /// The sample of the square that holds pixel `(x_px, y_px)`; beyond the picture, the nearest sample.
     #[inline]
     #[must_use]
     pub fn at(&self, x_px: i32, y_px: i32) -> GuideSample {

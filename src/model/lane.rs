@@ -1,7 +1,7 @@
 //! A lane: one picture among those evolved together, with its population baked and sorted into blocks.
 //!
 //! This is the part of an evaluation that the CPU keeps for every evaluator: which tiles there are, which blocks they
-//! touch, and which blocks the last replacements made stale.
+//! touch, and which blocks are stale after the last replacements.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub struct Lane {
     tiles: Vec<Tile>,
     lists: BlockLists,
     touched: Vec<u32>,
-    /// Per block the nearest depth key that came or went since the last refresh, or [`UNTOUCHED`].
+    /// For each block, the nearest depth key that was added or removed since the last refresh, or [`UNTOUCHED`].
     nearest_change: Vec<u64>,
 }
 
@@ -66,8 +66,8 @@ impl Lane {
         &self.scene
     }
 
-    /// The target's pixels block by block, rows within blocks, packed with [`INSIDE`]; the overhang of blocks at the
-    /// edges is 0.
+    /// The target's pixels block by block, rows within blocks, packed with [`INSIDE`]; where blocks reach beyond the
+    /// picture it is 0.
     #[must_use]
     pub fn blocked_target(&self) -> Vec<u32> {
         let target = &self.scene.target;
@@ -102,8 +102,8 @@ impl Lane {
         &self.touched
     }
 
-    /// The nearest depth key that came to or went from `block` since it was refreshed. What lies in front of it is as it
-    /// was.
+    /// The nearest depth key that was added to or removed from `block` since it was refreshed. Nothing in front of it
+    /// changed.
     #[must_use]
     pub fn nearest_change(&self, block: usize) -> u64 {
         self.nearest_change[block]
@@ -116,7 +116,7 @@ impl Lane {
         }
     }
 
-    /// Replaces the whole population and marks nothing as touched: all blocks are stale.
+    /// Replaces the whole population. All blocks are stale, so none is marked as touched.
     ///
     /// # Panics
     /// If `flies` is not as long as the scene's `fly_count`.

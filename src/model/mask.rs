@@ -8,24 +8,24 @@ pub const MASK_SIDE: usize = 256;
 pub const TEXELS: usize = MASK_SIDE * MASK_SIDE;
 /// Coverage from which a texel belongs to the tile; below it the tile has a hole there.
 pub const COVERAGE_THRESHOLD: u8 = 128;
-/// Largest number of layers in a set: what every Vulkan 1.3 device offers in an array image.
+/// Largest number of layers in a set: every Vulkan 1.3 device offers as many in an array image.
 pub const MASK_LAYERS_MAX: usize = 256;
 
 /// How a texel's coverage decides what shows through the tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Blend {
-    /// The tile is there from [`COVERAGE_THRESHOLD`] on, and hides what lies behind it.
+    /// From [`COVERAGE_THRESHOLD`] on, the texel belongs to the tile and hides what lies behind it.
     #[default]
     Opaque,
     /// Coverage is the tile's opacity: 0 shows what lies behind, 255 hides it ([`super::translucency`]).
     Translucent,
 }
 
-/// One texel: whether the tile is there, and how bright its colour is there.
+/// One texel: how much of it the tile covers, and how bright the tile's colour is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Texel {
-    /// 0 is a hole, 255 is full; what lies between is for [`Blend`] to say.
+    /// 0 is a hole, 255 is full; [`Blend`] says what the values between mean.
     pub coverage: u8,
     /// Factor of every colour channel: a channel `c` becomes `(c * shade + 127) / 255`.
     pub shade: u8,
@@ -82,7 +82,7 @@ impl Default for MaskSet {
 }
 
 impl MaskSet {
-    /// The set of the square and `others`, which become layers 1, 2, ...; opaque.
+    /// An opaque set of the square and `others`, which become layers 1, 2, ...
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more than [`MASK_LAYERS_MAX`] layers.
@@ -98,7 +98,7 @@ impl MaskSet {
         Ok(Self { layers, blend: Blend::Opaque })
     }
 
-    /// The same masks, their coverage read as `blend` says.
+    /// The same masks with their coverage read as `blend` says.
     #[must_use]
     pub fn with_blend(self, blend: Blend) -> Self {
         Self { blend, ..self }

@@ -1,7 +1,7 @@
 //! Plain data that every evaluator shares: flies, the tiles they become, targets, masks, random numbers, operators.
 //!
-//! Everything here is integers, so that the CPU twin and every GPU decide the same. Nothing here knows a device, a file
-//! or a clock.
+//! Everything here is integers, so the CPU twin and every GPU decide alike. Nothing here knows a device, a file or a
+//! clock.
 
 pub mod blocks;
 pub mod cells;
@@ -13,6 +13,7 @@ pub mod lane;
 pub mod mask;
 pub mod mosaic;
 pub mod operators;
+pub mod painter;
 pub mod population;
 pub mod rng;
 pub mod tables;
@@ -28,6 +29,7 @@ pub use guide::{Guide, GuideSample};
 pub use lane::{Lane, Scene};
 pub use mask::{Blend, Mask, MaskSet};
 pub use mosaic::{Mosaic, Patch};
+pub use painter::Painter;
 pub use population::{Backdrop, Population};
 pub use target::{Rgb, Target};
 pub use tile::{Canvas, Tile};

@@ -11,9 +11,9 @@ pub struct Mosaic {
     pub width_px: u32,
     /// Height in px.
     pub height_px: u32,
-    /// `width_px * height_px` colours; with alpha they are not premultiplied, and black where nothing is.
+    /// `width_px * height_px` colours; with alpha they are not premultiplied, and black where the picture is empty.
     pub pixels: Vec<Rgb>,
-    /// `width_px * height_px` opacities, 0 where nothing is to 255; none if the whole picture is opaque.
+    /// `width_px * height_px` opacities, from 0 where the picture is empty to 255; `None` if the backdrop is a colour.
     pub alpha: Option<Vec<u8>>,
 }
 
@@ -31,7 +31,7 @@ pub struct Patch {
 }
 
 impl Mosaic {
-    /// A black mosaic of the size of `canvas`; of alpha 0 if `backdrop` is transparent.
+    /// A black mosaic of the size of `canvas`, with alpha 0 if `backdrop` is transparent.
     #[must_use]
     pub fn new(canvas: &Canvas, backdrop: Backdrop) -> Self {
         let pixel_count = canvas.width_px as usize * canvas.height_px as usize;
@@ -41,9 +41,9 @@ impl Mosaic {
 
     /// Writes the pixels of a patch of samples: each pixel is the mean of `supersampling`² samples, rounded half up.
     ///
-    /// `samples` are packed colours, row by row, and with alpha their opacity in the highest byte: a pixel's alpha is the
-    /// mean of theirs, and its colour the mean weighted by it. The mean is of stored 8-bit values, as everywhere in the
-    /// engine. The patch must start at a multiple of `supersampling` and hold whole pixels.
+    /// `samples` are packed colours, row by row. With alpha, their highest byte is their opacity: the pixel's alpha is
+    /// the mean of these opacities, and its colour the mean weighted by them. The mean is of stored 8-bit values, as
+    /// everywhere in the engine. The patch must start at a multiple of `supersampling` and hold whole pixels.
     pub fn absorb(&mut self, patch: &Patch, samples: &[u32], supersampling: u32) {
         let (x, y) = (patch.x / supersampling, patch.y / supersampling);
         let width = (patch.width_px / supersampling) as usize;
@@ -78,7 +78,8 @@ fn mean<'a>(rows: impl Iterator<Item = &'a [u32]>, supersampling: u32) -> Rgb {
     sums.map(|sum| ((sum + count / 2) / count) as u8)
 }
 
-/// The mean opacity of `supersampling`² samples, and the mean of their colours weighted by it; black if it is 0.
+/// The mean opacity of `supersampling`² samples, and the mean of their colours weighted by opacity; black if the
+/// opacity is 0.
 fn mean_with_alpha<'a>(rows: impl Iterator<Item = &'a [u32]>, supersampling: u32) -> (Rgb, u8) {
     let count = supersampling * supersampling;
     let (mut sums, mut weight) = ([0; 3], 0);

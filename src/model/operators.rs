@@ -1,7 +1,7 @@
 //! Gene-level steps of the paper's scheme, in integers: the random fly, mutation, crossover and the split in two.
 //!
-//! Amplitudes are standard deviations. They are not in the paper; the defaults are the best found for 40,000 births on
-//! the development pictures (`cargo bench --bench paper_run` repeats the run they were chosen by).
+//! Amplitudes are standard deviations. The paper does not give them. The defaults are the best found for 40,000 births
+//! on the development pictures; `cargo bench --bench paper_run` repeats the run that chose them.
 
 use super::fly::{Fly, SIDE_MAX, SIDE_MIN, UNITS_PER_PX, Z_MAX, position_max};
 use super::rng::Stream;
@@ -57,7 +57,7 @@ impl Amplitudes {
         }
     }
 
-    /// The same without any step of the angle, if tiles do not turn.
+    /// The same, but the angle makes no step if tiles do not turn.
     #[must_use]
     pub fn turning(self, rotation: Rotation) -> Self {
         Self { angle: if rotation == Rotation::None { 0 } else { self.angle }, ..self }
@@ -87,7 +87,7 @@ pub enum Rotation {
     None,
 }
 
-/// Where random flies come from (paper section 4).
+/// What random flies are like (paper section 4).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RandomFlies {
     /// Width of the picture in px.
@@ -124,7 +124,7 @@ impl RandomFlies {
     }
 }
 
-/// One of `layers`, all equally likely; draws only if there is a choice.
+/// One of `layers`, all equally likely. Draws a random number only if there is a choice.
 #[must_use]
 pub fn random_layer(layers: &[u16], stream: &mut Stream) -> u16 {
     match layers {
@@ -151,13 +151,13 @@ pub fn mutated(parent: &Fly, amplitudes: &Amplitudes, width_px: u32, height_px: 
 }
 
 /// The arithmetic crossover of two flies: every gene lies `weight_q16` / 65536 of the way from `first` to `second`, the
-/// angle on the shorter way round. The mask is the first one's.
+/// angle on the shorter way round. The mask is that of `first`.
 #[must_use]
 pub fn crossed(first: &Fly, second: &Fly, weight_q16: u32) -> Fly {
     let way = |distance: i64| (distance * i64::from(weight_q16) + (1 << 15)) >> 16;
     let between = |one: i64, other: i64| one + way(other - one);
     let channel = |one: u16, other: u16| between(i64::from(one), i64::from(other)) as u16;
-    // Modulo a turn, as a signed number: the shorter way, and the negative one between opposite angles.
+    // As a signed 16-bit number the difference is the shorter way round; between opposite angles it is negative.
     let turn = i64::from(second.angle.wrapping_sub(first.angle) as i16);
     Fly {
         x: between(i64::from(first.x), i64::from(second.x)) as i32,

@@ -18,7 +18,7 @@ pub enum Backdrop {
 }
 
 impl Backdrop {
-    /// The colour behind the tiles where there can be no alpha: black if the backdrop is transparent.
+    /// The colour behind the tiles for a picture that cannot have alpha: black if the backdrop is transparent.
     #[must_use]
     pub fn color(self) -> Rgb {
         match self {

@@ -1,7 +1,7 @@
 //! The counter-based generator: Philox 4x32-10 (Salmon et al., SC 2011).
 //!
 //! Every decision draws from its own [`Stream`], named by (seed, purpose, round, slot). What a stream yields depends on
-//! its name alone: never on threads, on other streams, or on how many pictures evolve together.
+//! its name alone: never on threads, other streams, or the number of pictures that evolve together.
 
 use std::convert::Infallible;
 
@@ -54,7 +54,7 @@ impl Stream {
         ((u64::from(self.bits()) * u64::from(bound)) >> 32) as u32
     }
 
-    /// True with a probability of `probability_q16` / 65536: always from 65,536 on.
+    /// True with a probability of `probability_q16` / 65536; always true from 65,536 on.
     pub fn chance(&mut self, probability_q16: u32) -> bool {
         self.bits() >> 16 < probability_q16
     }

@@ -1,6 +1,6 @@
 //! Integer tables of sine, size steps and bell-shaped steps, made once on the host by a portable implementation.
 //!
-//! `libm` gives the same bits on every platform, so the tables, and all that is decided with them, are the same
+//! `libm` gives the same bits on every platform, so the tables and every decision made with them are the same
 //! everywhere. A device gets the tables as plain numbers.
 
 use std::sync::LazyLock;
@@ -28,7 +28,7 @@ static SIZE_FACTOR: LazyLock<Vec<u64>> = LazyLock::new(|| {
     (-SIZE_STEPS..=SIZE_STEPS).map(|step| libm::round(65536.0 * libm::exp(f64::from(step) / 256.0)) as u64).collect()
 });
 
-/// Cosine and sine, in units of 1/[`TRIG_ONE`], of an angle of 16 bits a turn; its top 12 bits count.
+/// Cosine and sine, in units of 1/[`TRIG_ONE`], of an angle in 1/65536 of a turn; only its top 12 bits count.
 #[must_use]
 pub fn cos_sin(angle: u16) -> (i32, i32) {
     let step = usize::from(angle >> 4);

@@ -1,4 +1,5 @@
-//! Fitness as a running sum over blocks: a block that is evaluated anew takes its old parts off and adds its new ones.
+//! Fitness as a running sum over blocks: when a block is evaluated again, its old parts are subtracted and its new ones
+//! added.
 
 use super::evaluation::Evaluation;
 
@@ -12,7 +13,7 @@ pub struct BlockParts {
 }
 
 impl BlockParts {
-    /// Replaces what was there by `error` and a part of marginal fitness for each fly.
+    /// Replaces the parts by `error` and a part of marginal fitness for each fly.
     pub fn set(&mut self, flies: impl Iterator<Item = u32>, marginal: &[i32], error: u32) {
         self.error = error;
         self.marginal.clear();
@@ -28,13 +29,13 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// The tally of `fly_count` flies and no block.
+    /// The tally of `fly_count` flies before any block is added.
     #[must_use]
     pub fn new(fly_count: usize) -> Self {
         Self { sae: 0, marginal: vec![0; fly_count] }
     }
 
-    /// Takes all blocks off.
+    /// Subtracts all blocks.
     pub fn clear(&mut self) {
         self.sae = 0;
         self.marginal.fill(0);
@@ -48,7 +49,7 @@ impl Tally {
         }
     }
 
-    /// Takes off a block that was added.
+    /// Subtracts a block that was added before.
     pub fn subtract(&mut self, block: &BlockParts) {
         self.sae -= u64::from(block.error);
         for &(fly, part) in &block.marginal {

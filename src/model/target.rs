@@ -22,7 +22,7 @@ pub fn weight_of_luma(luma: u8) -> u8 {
     1 + ((u32::from(luma) * u32::from(WEIGHT_MAX - 1) * 2 + 255) / 510) as u8
 }
 
-/// The pixels to match: 8-bit sRGB, row by row from the top; and, where not all of them matter alike, how much they do.
+/// The pixels to match: 8-bit sRGB, row by row from the top. If they do not all matter alike, they have weights.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
     width_px: u32,
@@ -49,10 +49,10 @@ impl Target {
         Ok(Self { width_px, height_px, pixels, weights: None, transparent: None })
     }
 
-    /// The same pixels, where the error of each counts times its weight, 1 to [`WEIGHT_MAX`], row by row from the top.
+    /// The same pixels, with the error of each multiplied by its weight, 1 to [`WEIGHT_MAX`], row by row from the top.
     ///
-    /// Only proportions matter, so the weights are divided by what divides them all; if that makes all of them 1, the
-    /// target has none.
+    /// Only proportions matter, so the weights are divided by their greatest common divisor. If all of them become 1,
+    /// the target has no weights.
     ///
     /// # Errors
     /// [`Error::Parameter`] if their count does not fit the size, or if one is out of range.
@@ -67,7 +67,8 @@ impl Target {
         Ok(self)
     }
 
-    /// The same pixels, where no tile is wanted at those that are true, row by row from the top; if none is, all is opaque.
+    /// The same pixels, row by row from the top, where no tile is wanted at those marked true. If none is, the target
+    /// is opaque.
     ///
     /// # Errors
     /// [`Error::Parameter`] if their count does not fit the size.
@@ -99,14 +100,14 @@ impl Target {
         &self.pixels
     }
 
-    /// What the error of every pixel is multiplied by, row by row, 1 to [`WEIGHT_MAX`] and with no common divisor; none
-    /// if all pixels count alike.
+    /// What the error of every pixel is multiplied by, row by row, 1 to [`WEIGHT_MAX`] and with no common divisor;
+    /// `None` if all pixels count alike.
     #[must_use]
     pub fn weights(&self) -> Option<&[u8]> {
         self.weights.as_deref()
     }
 
-    /// Whether no tile is wanted at a pixel, row by row; none if tiles are wanted everywhere.
+    /// For each pixel, row by row, whether no tile is wanted there; `None` if tiles are wanted everywhere.
     #[must_use]
     pub fn transparent(&self) -> Option<&[bool]> {
         self.transparent.as_deref()

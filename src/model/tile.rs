@@ -1,6 +1,7 @@
-//! A tile: the fly baked for pixels. It is all that a pixel decision ever reads, on the CPU and on every device.
+//! A tile: the fly baked for pixels. It is all that a decision about a pixel ever reads, on the CPU and on every
+//! device.
 //!
-//! Twin: `glsl/shared/tile.glsl`. Coverage is integer, so both give the same bits.
+//! Twin: `glsl/shared/tile.glsl`. Coverage is an integer test, so both give the same bits.
 
 use super::fly::{Fly, SIDE_MAX, UNITS_PER_PX};
 use super::mask::MASK_SIDE;
@@ -11,7 +12,7 @@ use super::target::Rgb;
 /// `u = u0 + (i - x0) * cos + (j - y0) * sin` and `v = v0 - (i - x0) * sin + (j - y0) * cos`, both counted from the
 /// tile's corner; it is covered iff `u < w * 4096` and `v < h * 4096` as unsigned 32-bit numbers.
 ///
-/// Half-open in the tile's own frame: two abutting tiles of one axis-parallel angle never double or drop a pixel.
+/// The test is half-open in the tile's own frame, so two axis-parallel tiles that abut never double or drop a pixel.
 /// Everything fits 32 bits inside the box, whatever the size of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -40,7 +41,7 @@ pub struct Tile {
     pub color: u32,
     /// Layer of the mask set; 0 is the full square and is never looked up.
     pub mask: u32,
-    /// [`inverse`] of the width: texels are found without a division per pixel.
+    /// [`inverse`] of the width, which finds texels without a division per pixel.
     pub w_inverse: u32,
     /// [`inverse`] of the height.
     pub h_inverse: u32,
@@ -109,14 +110,14 @@ impl Tile {
     /// The tile of `fly` on `canvas`; [`Tile::EMPTY`] if the fly is absent or its tile misses the canvas.
     ///
     /// Each tile is measured in the finest unit (1/64 px, 1/32 px, ... 1 px) in which its sides fit 18 bits; at
-    /// evaluation size that is always 1/64 px. A side beyond 2^18 px of the canvas counts as 2^18 px.
+    /// evaluation size that is always 1/64 px. A side longer than 2^18 canvas px counts as 2^18 px.
     #[must_use]
     pub fn bake(fly: &Fly, canvas: &Canvas) -> Self {
         Self::bake_with_ring(fly, canvas, 0)
     }
 
-    /// As [`Tile::bake`], with a ring of grout of `ring_width` in 1/64 px at evaluation size. It is scaled and rounded as
-    /// the sides are.
+    /// As [`Tile::bake`], with a ring of grout of `ring_width` in 1/64 px at evaluation size. It is scaled and rounded
+    /// as the sides are.
     #[must_use]
     pub fn bake_with_ring(fly: &Fly, canvas: &Canvas, ring_width: u32) -> Self {
         if !fly.alive {
@@ -181,14 +182,15 @@ impl Tile {
         self.h * TRIG_ONE as u32
     }
 
-    /// Whether a covered pixel at tile coordinates `(u, v)` shows the tile's own colour; else it shows the grout.
+    /// Whether a covered pixel at tile coordinates `(u, v)` shows the tile's own colour rather than the grout.
     ///
-    /// It is inside the ring iff `ring * 4096 <= u < (w - ring) * 4096`, and v likewise. A tile with a side of at most two
-    /// rings has no inside.
+    /// It is inside the ring iff `ring * 4096 <= u < (w - ring) * 4096`, and v likewise. A tile with a side of at most
+    /// two rings has no inside.
     #[inline(always)]
     #[must_use]
     pub fn is_inside_ring(&self, u: u32, v: u32) -> bool {
-        // A side is at most 2^18, and a ring no wider: twice the ring fits 32 bits, and below it the difference wraps.
+        // A side is at most 2^18 and a ring no wider, so twice the ring fits 32 bits. For a place before the ring's end
+        // the difference wraps to a large number.
         let ring = self.ring * TRIG_ONE as u32;
         let within = |place: u32, end: u32| place.wrapping_sub(ring) < end.saturating_sub(2 * ring);
         within(u, self.u_end()) & within(v, self.v_end())
@@ -206,8 +208,8 @@ impl Tile {
         (u as u32, v as u32)
     }
 
-    /// Whether the tile may cover a pixel of a block of `side` x `side` px, at most a few dozen, that touches its box and
-    /// whose upper left pixel is `(x, y)`. Turned tiles fill half of their boxes, so many a block is spared.
+    /// Whether the tile may cover a pixel of a block of `side` x `side` px, at most a few dozen, that touches its box
+    /// and whose upper left pixel is `(x, y)`. A turned tile may fill only half of its box, so this spares many blocks.
     #[inline(always)]
     #[must_use]
     pub fn may_cover(&self, (x, y): (i32, i32), side: i32) -> bool {
@@ -222,7 +224,7 @@ impl Tile {
     }
 
     /// The mask texel (column, row) at tile coordinates `(u, v)` of a covered pixel: `floor(u * 256 / (w * 4096))`,
-    /// exactly, in 32 bits. Elsewhere both are any numbers.
+    /// exactly, in 32 bits. For other pixels the result means nothing.
     #[inline(always)]
     #[must_use]
     pub fn texel(&self, u: u32, v: u32) -> (u32, u32) {
@@ -231,23 +233,24 @@ impl Tile {
     }
 }
 
-/// What `quotient` multiplies by instead of dividing by `divisor`, 1 to 2^18: `2^(23 + shift) / divisor` in 24 bits,
-/// above it the shift that leaves 16 bits of any `value < divisor << 8`.
+/// What [`quotient`] multiplies by instead of dividing by `divisor`, 1 to 2^18. The low 24 bits are `2^(23 + shift) /
+/// divisor`; the bits above are the shift that leaves 16 bits of any `value < divisor << 8`.
 #[must_use]
 pub fn inverse(divisor: u32) -> u32 {
     let shift = 24 - divisor.leading_zeros().min(24);
     (shift << 24) | (((1_u64 << (23 + shift)) - 1) / u64::from(divisor)) as u32
 }
 
-/// `value / divisor` for `value < divisor << 8`, given the divisor's [`inverse`]; any number for other values.
+/// `value / divisor` for `value < divisor << 8`, given the divisor's [`inverse`]. For other values the result means
+/// nothing.
 ///
-/// Of the quotient, below 2^8, the shift loses less than 2^-7, and so does the inverse with its 15 bits at least: the
-/// estimate is the quotient or one less. All products fit 32 bits.
+/// The quotient is below 2^8. The shift loses less than 2^-7 of it, and so does the inverse, which has at least 15
+/// bits. So the estimate is the quotient or one less. All products fit 32 bits.
 #[inline(always)]
 #[must_use]
 pub fn quotient(value: u32, divisor: u32, inverse: u32) -> u32 {
     let estimate = (value >> (inverse >> 24)).wrapping_mul(inverse & 0xFF_FFFF) >> 23;
-    // 0 if the estimate is one less, else -1: without a comparison, which would not stay in a vector.
+    // 0 if the estimate is one less, else -1. A comparison would not stay in a vector.
     let is_enough = value.wrapping_sub(estimate.wrapping_mul(divisor)).wrapping_sub(divisor) as i32 >> 31;
     estimate.wrapping_add(1).wrapping_add(is_enough as u32)
 }
@@ -259,7 +262,7 @@ impl Fly {
         [self.r, self.g, self.b].map(|channel| ((u32::from(channel) * 255 + 32_767) / 65_535) as u8)
     }
 
-    /// The fly with a colour as stored in pictures; [`Fly::color`] gives the same colour back.
+    /// The fly with this 8-bit colour; [`Fly::color`] gives the same colour back.
     #[must_use]
     pub fn with_color(&self, color: Rgb) -> Self {
         let [r, g, b] = color.map(|channel| u16::from(channel) * 257);
@@ -287,8 +290,8 @@ fn round_half_up(value: i64, divisor: i64) -> i64 {
     (2 * value + divisor).div_euclid(2 * divisor)
 }
 
-/// Half of the tile's extent along one axis, rounded up: the table's sine and cosine are rounded, so the map is up to
-/// 1/2900 smaller than a rotation, which the second term covers.
+/// Half of the tile's extent along one axis, rounded up. The table's sine and cosine are rounded, so the map may be up
+/// to 1/2900 smaller than a rotation; the second term makes up for that.
 fn half_extent(along: i64, across: i64, w: i64, h: i64) -> i64 {
     let sum = along.abs() * w + across.abs() * h;
     (sum >> 13) + (sum >> 23) + 2
@@ -362,7 +365,8 @@ mod tests {
         }
     }
 
-    /// The tile's map and box against the same rule in 128 bits, without a box, at random pixels and around the box.
+    /// Compares the tile's map and box with the same rule in 128 bits and without a box, at random pixels and around
+    /// the box.
     fn check_against_wide_integers(fly: &Fly, canvas: &Canvas, stream: &mut Stream) {
         let ring_width = 1 << stream.below(19) >> 1;
         let tile = Tile::bake_with_ring(fly, canvas, ring_width);
@@ -384,7 +388,7 @@ mod tests {
         }
     }
 
-    /// Whether a pixel is inside the ring; none if it is not covered.
+    /// Whether a pixel is inside the ring; `None` if it is not covered.
     fn inside_in_wide_integers(fly: &Fly, canvas: &Canvas, ring_width: u32, (i, j): (i32, i32)) -> Option<bool> {
         let (numerator, denominator) = (i128::from(canvas.scale.0), i128::from(canvas.scale.1));
         let rounded = |value: i128, divisor: i128| (2 * value + divisor).div_euclid(2 * divisor);

@@ -1,12 +1,12 @@
-//! How translucent tiles add up: composited nearest first, in fixed point, with one rounding rule for everybody.
+//! How translucent tiles add up: composited nearest first, in fixed point, with one rounding rule everywhere.
 //!
-//! Twin: `glsl/shared/translucency.glsl`. A pixel begins with a transmittance of [`CLEAR`]. A layer of opacity `a` leaves
-//! `kept(T, a)` of it; what it takes away is the weight of its colour. What is left at the end is the weight of the
-//! background. Weights always add up to [`CLEAR`], so a picture of one colour stays that colour, and with opacities of
-//! nothing or all the rule is that of opaque tiles.
+//! Twin: `glsl/shared/translucency.glsl`. A pixel begins with a transmittance of [`CLEAR`]. A layer of opacity `a`
+//! keeps `kept(T, a)` of a transmittance `T`; what it takes away is the weight of its colour. What is left at the end
+//! is the weight of the background. Weights always add up to [`CLEAR`], so a picture of one colour stays that colour.
+//! If every opacity is 0 or [`SOLID`], the rule is that of opaque tiles.
 //!
-//! Rounding down lets the transmittance reach 0 after at most [`LAYERS_MAX`] layers, whatever they are. That is why
-//! marginal fitness can be exact at any depth: see [`widest_after`].
+//! Because of the rounding down, the transmittance reaches 0 after at most [`LAYERS_MAX`] layers, whatever they are.
+//! That is why marginal fitness can be exact at any depth: see [`widest_after`].
 
 use super::target::Rgb;
 use super::tile::pack;
@@ -25,17 +25,18 @@ pub const fn opacity(coverage: u32) -> u32 {
 
 /// What a layer of `opacity` leaves of a transmittance, rounded down.
 ///
-/// It never rises and, for an opacity above 0, always falls; a larger transmittance never leaves less.
+/// The result is never larger than the transmittance, and for an opacity above 0 always smaller. A larger transmittance
+/// never leaves less.
 #[inline]
 #[must_use]
 pub const fn kept(transmittance: u32, opacity: u32) -> u32 {
     (transmittance * (SOLID - opacity)) >> 8
 }
 
-/// The largest transmittance that the layers so far leave when any one of them is taken out, after a layer of
-/// `opacity` met `transmittance`; `widest` is the same before that layer, and 0 before the first.
+/// The largest transmittance that the layers so far could leave if any one of them were left out. The last of them, of
+/// `opacity`, met `transmittance`; `widest` is the result before that layer, and 0 before the first.
 ///
-/// As [`kept`] is monotone, the largest is exact: when it is 0, no deeper layer shows, with or without any one fly.
+/// It is exact since [`kept`] is monotone: once it is 0, no deeper layer shows, even if one fly is left out.
 #[inline]
 #[must_use]
 pub const fn widest_after(widest: u32, transmittance: u32, opacity: u32) -> u32 {
@@ -50,12 +51,12 @@ pub const fn channel(sum: u32) -> u32 {
     (sum + CLEAR / 2) >> 16
 }
 
-/// The most layers with an opacity above 0 that a pixel can have before no deeper one shows: a fact of the rounding,
-/// not a cap.
+/// The most layers with an opacity above 0 that a pixel can have before no deeper one shows. This follows from the
+/// rounding; it is not a cap.
 pub const LAYERS_MAX: usize = layers_max();
 
 const fn layers_max() -> usize {
-    // The faintest layers take longest: any other leaves less, and less never becomes more.
+    // The faintest layers take longest: any other layer leaves less, and from less no layer leaves more.
     let (mut layers, mut transmittance, mut widest) = (0, CLEAR, 0);
     while layers == 0 || widest > 0 {
         widest = widest_after(widest, transmittance, 1);
@@ -68,7 +69,7 @@ const fn layers_max() -> usize {
 /// A pixel between two of its layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Compositing {
-    /// Weight that is left for what lies behind, [`CLEAR`] at first.
+    /// Weight left for what lies behind, [`CLEAR`] at first.
     pub transmittance: u32,
     /// Sum of the weighted channels so far.
     pub sums: [u32; 3],
@@ -94,7 +95,8 @@ impl Compositing {
         self.sums.map(|sum| channel(sum) as u8)
     }
 
-    /// The colour of the layers alone, not premultiplied, packed with their opacity in the highest byte; 0 if that is 0.
+    /// The colour of the layers alone, not premultiplied, packed with their opacity in the highest byte; 0 if that is
+    /// 0.
     #[inline]
     #[must_use]
     pub fn alone(self) -> u32 {

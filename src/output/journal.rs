@@ -1,4 +1,4 @@
-//! A file of lines, to which one process or several add.
+//! A file of lines that one or several processes append to.
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::output_error;
 use crate::error::Result;
 
-/// A file of lines that grows line by line, each written whole, by one process or by several.
+/// A file of lines. Each line is written whole, even if several processes append at once.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
@@ -15,7 +15,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// The journal at `path`, begun if there is none.
+    /// Opens the journal at `path`, or creates an empty one.
     ///
     /// # Errors
     /// [`crate::Error::Output`] if it cannot be written to.
@@ -24,18 +24,18 @@ impl Journal {
         Ok(Self { path: path.to_owned(), file: file.map_err(|error| output_error(path, &error))? })
     }
 
-    /// Adds a line, which has no end of its own. A line that a killed process left unfinished is ended first.
+    /// Appends `line`, which must not end in a line feed. A line that a killed process left unfinished is ended first.
     ///
     /// # Errors
-    /// [`crate::Error::Output`] if the disk is full or the file went away.
+    /// [`crate::Error::Output`] if the disk is full or the file is gone.
     pub fn append(&mut self, line: &str) -> Result<()> {
-        // Where the file system has no locks, short writes at the end do not mix either.
+        // Even where the file system has no locks, short appends do not mix.
         let is_locked = self.file.lock().is_ok();
         let length = self.file.metadata().ok().filter(Metadata::is_file).map(|found| found.len());
         let done = self.append_whole(line);
         if is_locked {
-            // A half line tells nothing. If it cannot be taken away, the next line ends it. Without the lock, it might be
-            // another process's line that would be cut.
+            // Half a line is useless, so it is cut off; if that fails, the next line ends it. Without the lock, this
+            // might cut the line of another process.
             if let (Err(_), Some(length)) = (&done, length) {
                 let _ = self.file.set_len(length);
             }

@@ -1,6 +1,6 @@
-//! Writing a result so that a reader sees the old file or the whole new one, never a half.
+//! Writing results so that a reader sees either the old file or the whole new one, never half of one.
 //!
-//! The bytes go to a temporary file beside the target, which then takes the target's name. Nothing here knows what the
+//! The bytes go to a temporary file beside the target, which is then renamed to the target. Nothing here knows what the
 //! bytes mean, or whether the user agreed to replace what is there.
 
 mod journal;
@@ -19,18 +19,19 @@ use crate::error::{Error, Result};
 /// How the names of temporary files begin and end.
 const PREFIX: &str = ".smalti-";
 const SUFFIX: &str = ".partial";
-/// What ends the host in such a name; no host has it.
+/// Ends the host's name in the name of a temporary file; no host's name contains it.
 const HOST_END: char = '@';
-/// Temporary files of other hosts, whose locks may not reach here, are left behind if nobody wrote to them for so long.
+/// Temporary files of another host count as abandoned if nobody wrote to them for this long, since its locks may not be
+/// visible here.
 const LEFT_AFTER: Duration = Duration::from_secs(24 * 3600);
-/// The file in a temporary folder that its process holds locked.
+/// The file in a temporary folder on which its process holds a lock.
 const LOCK: &str = ".lock";
 
 /// Writes `bytes` to `path`, replacing what is there in one step.
 ///
-/// A new file gets the permissions that the user's umask asks for; a replaced one keeps its own. A symbolic link
-/// to a file stays, and that file is replaced; one that leads nowhere is itself replaced. A device or a pipe (such as `/dev/stdout`) is written to directly. On
-/// failure the old file is as it was, and nothing is left beside it.
+/// A new file gets the permissions that the user's umask asks for; a replaced one keeps its own. A symbolic link to a
+/// file stays, and the file is replaced; a broken link is itself replaced. A device or a pipe (such as `/dev/stdout`)
+/// is written to directly. After a failure the old file is unchanged, and nothing is left beside it.
 ///
 /// # Errors
 /// [`Error::Output`] if the folder is missing or may not be written, the disk is full, or `path` is a folder.
@@ -38,8 +39,8 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     write(path, bytes, Durability::OnDisk)
 }
 
-/// As [`write_atomically`], but leaves it to the system when the bytes reach the disk: for files that come by the
-/// hundred and can be made again. A crash of the system, though not of the program, may leave an empty file.
+/// As [`write_atomically`], but the system decides when the bytes reach the disk. This is for files that are written by
+/// the hundred and can be made again. A crash of the system may leave an empty file; a crash of the program does not.
 ///
 /// # Errors
 /// [`Error::Output`], as from [`write_atomically`].
@@ -47,12 +48,12 @@ pub fn write_atomically_soon(path: &Path, bytes: &[u8]) -> Result<()> {
     write(path, bytes, Durability::Soon)
 }
 
-/// When a file is on the disk.
+/// When the bytes of a file must be on the disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Durability {
-    /// Before its writer goes on.
+    /// Before the writer continues.
     OnDisk,
-    /// When the system likes.
+    /// Whenever the system writes them.
     Soon,
 }
 
@@ -68,7 +69,8 @@ fn write(path: &Path, bytes: &[u8], durability: Durability) -> Result<()> {
     write().map_err(|error| output_error(path, &error))
 }
 
-/// A file that grows beside its target, and takes its name only when it is whole. Dropped before that, it goes away.
+/// A file that grows beside its target and takes the target's name only when it is complete. Dropping it earlier
+/// removes it.
 #[derive(Debug)]
 pub struct PartialFile {
     /// The target, as the user wrote it.
@@ -102,13 +104,13 @@ impl PartialFile {
         self.file.as_file().try_clone().map_err(|error| output_error(&self.path, &error))
     }
 
-    /// Where the file is while it grows, for other programs to write to.
+    /// The path of the file while it grows, so that other programs can write to it.
     #[must_use]
     pub fn growing_path(&self) -> &Path {
         self.file.path()
     }
 
-    /// The failure that [`write_atomically`] would give for `error`.
+    /// The error that [`write_atomically`] would return for `error`.
     #[must_use]
     pub fn failure(&self, error: &io::Error) -> Error {
         output_error(&self.path, error)
@@ -124,7 +126,8 @@ impl PartialFile {
     }
 }
 
-/// A folder that fills up beside its target, and takes its name only when it is whole. Dropped before that, it goes away.
+/// A folder that is filled beside its target and takes the target's name only when it is complete. Dropping it earlier
+/// removes it.
 #[derive(Debug)]
 pub struct PartialFolder {
     folder: TempDir,
@@ -132,7 +135,7 @@ pub struct PartialFolder {
 }
 
 impl PartialFolder {
-    /// An empty folder in `parent`, which is there.
+    /// Creates an empty folder in `parent`, which must exist.
     ///
     /// # Errors
     /// [`Error::Output`] if `parent` cannot be written to.
@@ -141,7 +144,7 @@ impl PartialFolder {
             let folder = names(0o777).tempdir_in(parent)?;
             match File::create_new(folder.path().join(LOCK)) {
                 Ok(lock) if is_held(&lock, &folder.path().join(LOCK)) => return Ok(Self { folder, lock }),
-                // Whoever sweeps found it before it was locked.
+                // A sweep found it before it was locked.
                 Ok(_) => {}
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 Err(error) => return Err(error),
@@ -150,13 +153,14 @@ impl PartialFolder {
         create().map_err(|error| output_error(parent, &error))
     }
 
-    /// Where the folder is while it fills up.
+    /// The path of the folder while it is filled.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Gives the folder the name `target`, in one step; gives it back if something is there that is no empty folder.
+    /// Renames the folder to `target` in one step. Returns it unchanged if something other than an empty folder is
+    /// there.
     ///
     /// # Errors
     /// [`Error::Output`] if it cannot be renamed.
@@ -164,7 +168,7 @@ impl PartialFolder {
         use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty, NotADirectory};
         match fs::rename(self.path(), target) {
             Ok(()) => {
-                // Not before: without its lock, it would be swept.
+                // Only now, since without its lock the folder could be swept.
                 drop(self.lock);
                 let _ = self.folder.keep();
                 let _ = fs::remove_file(target.join(LOCK));
@@ -176,22 +180,22 @@ impl PartialFolder {
     }
 }
 
-/// Whether [`write_atomically`] could write to `path` now, found out without leaving anything behind.
+/// Checks whether [`write_atomically`] could write to `path` now, and leaves nothing behind.
 ///
-/// To be asked before hours of work. It cannot foresee that the disk fills up.
+/// Call this before hours of work. It cannot foresee that the disk fills up.
 ///
 /// # Errors
-/// [`Error::Output`], as [`write_atomically`] would give.
+/// [`Error::Output`], as [`write_atomically`] would return.
 pub fn check_writable(path: &Path) -> Result<()> {
     let check = || match Place::of(path)? {
-        // Opening a pipe would wait for its reader.
+        // Opening a pipe would block until it has a reader.
         Place::Stream => Ok(()),
         Place::File { target, .. } => create_beside(&target)?.close(),
     };
     check().map_err(|error| output_error(path, &error))
 }
 
-/// Whether files can be written into `folder` now, found out without leaving anything behind.
+/// Checks whether files can be written into `folder` now, and leaves nothing behind.
 ///
 /// # Errors
 /// [`Error::Output`] about the folder.
@@ -229,13 +233,14 @@ impl Place {
     }
 }
 
-/// Whether `path` ends in a separator or in `.`: `Path` overlooks both, but no file can take such a name.
+/// Whether `path` ends in a separator or in `.`. `Path` ignores both, but no file can have such a name.
 fn names_a_folder(path: &Path) -> bool {
     let last = path.as_os_str().as_encoded_bytes().rsplit(|&byte| is_separator(char::from(byte))).next();
     matches!(last, Some(b"" | b"."))
 }
 
-/// An empty temporary file in the folder of `target`: only within one file system is a rename a single step.
+/// Creates an empty temporary file in the folder of `target`, since a rename is a single step only within one file
+/// system.
 fn create_beside(target: &Path) -> io::Result<NamedTempFile> {
     create_in(target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")))
 }
@@ -260,7 +265,7 @@ fn own_prefix() -> &'static str {
     })
 }
 
-/// How temporary files and folders are named, and what may be done with them, less what the umask takes away.
+/// The names of temporary files and folders, and their permissions before the umask applies.
 fn names(mode: u32) -> Builder<'static, 'static> {
     let mut builder = Builder::new();
     builder.prefix(own_prefix()).suffix(SUFFIX);
@@ -271,15 +276,15 @@ fn names(mode: u32) -> Builder<'static, 'static> {
     builder
 }
 
-/// Locks a file that was just made; false if whoever sweeps found it before, and then it is about to go.
+/// Locks a file that was just created. False if a sweep found it first, which removes it.
 fn is_held(file: &File, path: &Path) -> bool {
-    // Some file systems have no locks; there nothing is swept.
+    // On file systems without locks, nothing is swept.
     !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) && path.exists()
 }
 
-/// Removes the temporary files and folders that processes of this host left in `folder` when they were killed, and those of other
-/// hosts to which nobody wrote for a day by `age_of`. Those of living processes are locked, and stay, and so do those that belong
-/// to somebody else.
+/// Removes the temporary files and folders that killed processes left in `folder`. Those of this host are removed if no
+/// living process holds their lock, and those of other hosts if nobody wrote to them for a day, judged by `age_of`.
+/// Those that belong to another user stay.
 ///
 /// # Errors
 /// [`Error::Output`] if the folder cannot be read, or such a file cannot be removed.
@@ -297,7 +302,7 @@ pub fn sweep(folder: &Path, age_of: impl Fn(&Metadata) -> Option<Duration>) -> R
             let kind = entry.file_type()?;
             if kind.is_dir() {
                 pass_over_others(remove_folder_unless_in_use(&entry.path()))?;
-            // To open a pipe would wait for its writer.
+            // Opening a pipe would block until it has a writer.
             } else if kind.is_file() {
                 pass_over_others(remove_unless_in_use(&entry.path()))?;
             }
@@ -308,7 +313,7 @@ pub fn sweep(folder: &Path, age_of: impl Fn(&Metadata) -> Option<Duration>) -> R
 }
 
 fn remove_unless_in_use(path: &Path) -> io::Result<()> {
-    // For an exclusive lock, NFS wants a file that may be written to.
+    // NFS grants an exclusive lock only on a file that is open for writing.
     let file = File::options().read(true).write(true).open(path)?;
     if file.try_lock().is_ok() { fs::remove_file(path) } else { Ok(()) }
 }
@@ -317,7 +322,8 @@ fn remove_folder_unless_in_use(path: &Path) -> io::Result<()> {
     let lock = match File::options().read(true).write(true).open(path.join(LOCK)) {
         Ok(lock) => lock,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            // Its process has not come to lock it, and never will if it was killed. What is in use is not empty.
+            // Its process has not locked it yet, or was killed before it could. A folder in use is not empty, so this
+            // does not remove it.
             let _ = fs::remove_dir(path);
             return Ok(());
         }
@@ -327,7 +333,7 @@ fn remove_folder_unless_in_use(path: &Path) -> io::Result<()> {
         return Ok(());
     }
     match fs::remove_dir_all(path) {
-        // A child of the killed process still writes into it. The next time it may be over.
+        // A child of the killed process still writes into it. A later sweep may succeed.
         Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => File::create(path.join(LOCK)).map(drop),
         removed => removed,
     }
@@ -340,7 +346,7 @@ fn pass_over_others(removed: io::Result<()>) -> io::Result<()> {
     })
 }
 
-/// Gives a temporary file the name of its target, and the permissions of the file that it replaces.
+/// Renames a temporary file to its target, with the permissions of the file that it replaces.
 fn persist(file: NamedTempFile, target: &Path, old: Option<&Metadata>, durability: Durability) -> io::Result<()> {
     if let Some(old) = old {
         file.as_file().set_permissions(old.permissions())?;
@@ -354,7 +360,7 @@ fn persist(file: NamedTempFile, target: &Path, old: Option<&Metadata>, durabilit
 
 const DISK_FULL: &str = "the disk is full; free some space, or name a folder on another disk";
 
-/// Whether a failure of this module came of a full disk.
+/// Whether an error of this module was caused by a full disk.
 #[must_use]
 pub fn is_disk_full(error: &Error) -> bool {
     matches!(error, Error::Output { reason, .. } if reason == DISK_FULL)

@@ -1,9 +1,9 @@
 //! Animations frame by frame: APNG without loss, and GIF. Memory does not grow with the number of frames, and the same
 //! frames give the same bytes.
 //!
-//! Only the box around the pixels that changed is stored, and in it every pixel that did not change is transparent. That
-//! is smaller, and in a GIF also finer: each frame has a palette for its changed pixels alone, and what stays the same
-//! does not flicker.
+//! Only the box around the pixels that changed is stored, and in it every pixel that did not change is transparent.
+//! That saves bytes. In a GIF it also gives finer colours, since the palette of a frame serves its changed pixels
+//! alone, and unchanged pixels do not flicker.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -20,7 +20,7 @@ pub const GIF_FRAMES_PER_S_MAX: u16 = 50;
 const LEVEL: u8 = 6;
 /// Most bytes of a block of a GIF.
 const GIF_BLOCK_BYTES: usize = 255;
-/// The label of comments in a GIF.
+/// The label of a comment block in a GIF.
 const GIF_COMMENT: u8 = 0xFE;
 
 /// How many frames an animation has, and when it shows them.
@@ -30,14 +30,14 @@ pub struct Timing {
     pub frame_count: u32,
     /// Frames a second, at least 1; a GIF has at most [`GIF_FRAMES_PER_S_MAX`].
     pub frames_per_s: u16,
-    /// Time that the last frame is shown, in hundredths of a second.
+    /// How long the last frame is shown, in hundredths of a second.
     pub last_cs: u16,
-    /// How often the animation is shown; 0 is without end.
+    /// How often the animation plays; 0 repeats it forever.
     pub plays: u16,
 }
 
 impl Timing {
-    /// Hundredths of a second that frame `index` of a GIF is shown: rounded so that no error adds up.
+    /// How long frame `index` of a GIF is shown, in hundredths of a second, rounded so that errors do not add up.
     fn delay_cs(&self, index: u32) -> u16 {
         if index + 1 == self.frame_count {
             return self.last_cs;
@@ -59,11 +59,11 @@ struct Area {
 /// What changed from the frame before.
 struct Changes {
     area: Area,
-    /// The pixels of the area, row by row; none where nothing changed.
+    /// The pixels of the area, row by row; `None` where a pixel did not change.
     pixels: Vec<Option<[u8; 3]>>,
 }
 
-/// The frame before, to tell what changes.
+/// The previous frame, with which the next one is compared.
 #[derive(Debug)]
 struct Screen {
     width_px: usize,
@@ -75,7 +75,8 @@ impl Screen {
         Self { width_px: width_px as usize, shown: Vec::new() }
     }
 
-    /// Shows `pixels`; what changed, at least one pixel's area, and on the first frame everything.
+    /// Shows `pixels` and returns what changed: everything on the first frame, and an area of at least one pixel on any
+    /// other.
     fn show(&mut self, pixels: &[[u8; 3]]) -> Changes {
         let is_first = self.shown.is_empty();
         let has_changed = |place: &usize| is_first || self.shown[*place] != pixels[*place];
@@ -89,7 +90,7 @@ impl Screen {
         changes
     }
 
-    /// The least area around some places; a pixel in the corner if there are none.
+    /// The smallest area around some places; the pixel in the corner if there are none.
     fn bounds(&self, places: impl Iterator<Item = usize>) -> Area {
         let around = |bounds: Option<[usize; 4]>, place: usize| {
             let (x, y) = (place % self.width_px, place / self.width_px);
@@ -110,10 +111,10 @@ pub struct ApngEncoder<W: Write> {
 }
 
 impl<W: Write> ApngEncoder<W> {
-    /// Begins an animation of frames of `size_px`, width and height.
+    /// Begins an animation with frames of `size_px` (width, height).
     ///
     /// # Errors
-    /// If `out` cannot be written, or a number is 0 that must not be.
+    /// If `out` cannot be written, or the width, the height or the number of frames is 0.
     pub fn new(out: W, size_px: (u32, u32), timing: Timing, metadata: &Metadata) -> io::Result<Self> {
         let mut encoder = png::Encoder::new(out, size_px.0, size_px.1);
         encoder.set_color(png::ColorType::Rgba);
@@ -133,11 +134,11 @@ impl<W: Write> ApngEncoder<W> {
     /// Adds the next frame, row by row from the top.
     ///
     /// # Errors
-    /// If it cannot be written, or is one more than there should be.
+    /// If it cannot be written, or if it is one frame too many.
     pub fn add(&mut self, pixels: &[[u8; 3]]) -> io::Result<()> {
         let Changes { area, pixels } = self.screen.show(pixels);
         if self.next > 0 {
-            // In this order every step lies within the picture, as the encoder checks.
+            // The encoder checks that the frame lies within the picture after each call; in this order it always does.
             self.writer.reset_frame_position()?;
             self.writer.set_frame_dimension(area.width_px as u32, area.height_px as u32)?;
             self.writer.set_frame_position(area.x as u32, area.y as u32)?;
@@ -162,7 +163,7 @@ impl<W: Write> ApngEncoder<W> {
     }
 }
 
-/// Writes an animated GIF: as near to the frames as 255 colours a frame come.
+/// Writes an animated GIF: as close to the frames as 255 colours per frame allow.
 pub struct GifEncoder<W: Write> {
     encoder: gif::Encoder<W>,
     screen: Screen,
@@ -171,7 +172,7 @@ pub struct GifEncoder<W: Write> {
 }
 
 impl<W: Write> GifEncoder<W> {
-    /// Begins an animation of frames of `size_px`, width and height, at most 65,535.
+    /// Begins an animation with frames of `size_px` (width, height), each at most 65,535.
     ///
     /// # Errors
     /// If `out` cannot be written, or a side is too long.
@@ -179,7 +180,7 @@ impl<W: Write> GifEncoder<W> {
         let side = |px| u16::try_from(px).map_err(|_| io::Error::other("a GIF has at most 65,535 px along a side"));
         let mut encoder = gif::Encoder::new(out, side(size_px.0)?, side(size_px.1)?, &[]).map_err(gif_failure)?;
         if timing.plays != 1 {
-            // The file counts repetitions.
+            // The file stores the number of repetitions, which is one less than the number of plays.
             let repeat = timing.plays.checked_sub(1).map_or(Repeat::Infinite, Repeat::Finite);
             encoder.set_repeat(repeat).map_err(gif_failure)?;
         }
@@ -205,7 +206,7 @@ impl<W: Write> GifEncoder<W> {
         let transparent = palette.len() as u8;
         let mut indices = HashMap::new();
         let mut index_of = |color: [u8; 3]| -> u8 {
-            // The palette is in rising order.
+            // The search needs the palette in rising order, which it is.
             *indices
                 .entry(color)
                 .or_insert_with(|| palette.binary_search(&nearest(color, &palette)).unwrap_or_default() as u8)
@@ -236,7 +237,7 @@ impl<W: Write> GifEncoder<W> {
     }
 }
 
-/// The failure of the file, where it is one: a full disk has words of its own.
+/// The error of the file itself, if it is one, so that a full disk is recognised as such.
 fn gif_failure(error: gif::EncodingError) -> io::Error {
     match error {
         gif::EncodingError::Io(error) => error,

@@ -1,16 +1,16 @@
-//! From what a decoder gives to 8-bit sRGB: ICC profile, then alpha, then 8 bits with one rounding.
+//! From the pixels of a decoder to 8-bit sRGB: ICC profile, then alpha, then 8 bits with a single rounding.
 //!
-//! A row at a time in 16 bits per channel, so that a 16-bit picture in a linear profile keeps its shadows.
+//! Rows are converted one at a time in 16 bits per channel, so a 16-bit picture in a linear profile keeps its shadows.
 
 use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, Pixel, RgbImage, RgbaImage};
 
 use super::Background;
 use super::icc::Profile;
 
-/// The picture without its profile over `background`: as RGB, or, where transparency is kept and some pixel is not
-/// opaque, as RGBA with colours that are composited on black.
+/// The picture in sRGB over `background`, as RGB. If transparency is kept and some pixel is not opaque, it is RGBA
+/// instead, with colours composited on black.
 ///
-/// A profile that cannot be used is left out, with a warning.
+/// A profile that cannot be used is ignored with a warning.
 pub(super) fn to_srgb(
     image: DynamicImage,
     icc: Option<&[u8]>,
@@ -23,10 +23,14 @@ pub(super) fn to_srgb(
         Profile::Srgb
     });
     match background {
-        Background::Color(color) => Rows { profile, background: color }.over_background(image).into(),
+        Background::Color(color) => Conversion { profile, background: color }.over_background(image).into(),
         Background::Transparent => {
-            let rows = Rows { profile, background: [0; 3] };
-            if has_transparency(&image) { rows.with_alpha(image).into() } else { rows.over_background(image).into() }
+            let conversion = Conversion { profile, background: [0; 3] };
+            if has_transparency(&image) {
+                conversion.with_alpha(image).into()
+            } else {
+                conversion.over_background(image).into()
+            }
         }
     }
 }
@@ -65,8 +69,8 @@ pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> Gray
     GrayAlphaImage::from_raw(image.width(), image.height(), stencil).expect("every row has been converted")
 }
 
-/// The luma of a picture over black: weights of Rec. 709, of stored sRGB values. Grey stays as it is stored, whatever its
-/// profile, since somebody drew its values.
+/// The luma of a picture over black: weights of Rec. 709, of stored sRGB values. Grey stays as it is stored, whatever
+/// its profile, since somebody drew its values.
 ///
 /// A profile that cannot be used is left out: it would hardly change the luma.
 pub(super) fn to_luma_over_black(image: DynamicImage, icc: Option<&[u8]>) -> GrayImage {
@@ -99,12 +103,12 @@ fn quantised(channel: f32) -> u16 {
 }
 
 /// How every row is brought to 8-bit sRGB over a background.
-struct Rows {
+struct Conversion {
     profile: Profile,
     background: [u8; 3],
 }
 
-impl Rows {
+impl Conversion {
     /// The picture without its alpha.
     fn over_background(&self, image: DynamicImage) -> RgbImage {
         let (width_px, height_px) = (image.width(), image.height());
@@ -172,29 +176,29 @@ impl Rows {
 
 #[cfg(test)]
 mod tests {
-    use super::{Profile, Rows, quantised, widen};
+    use super::{Conversion, Profile, quantised, widen};
 
     #[test]
     fn compositing_8_bit_channels_rounds_to_the_nearest_8_bit_value() {
         for alpha in 0..=255_u8 {
             for channel in [0, 1, 77, 128, 254, 255] {
-                let rows = Rows { profile: Profile::Srgb, background: [0, 100, 255] };
+                let conversion = Conversion { profile: Profile::Srgb, background: [0, 100, 255] };
                 let pixel = [widen(channel), widen(channel), widen(channel), widen(alpha)];
                 let expected = [0_u32, 100, 255].map(|behind| {
                     let (channel, alpha) = (u32::from(channel), u32::from(alpha));
                     ((channel * alpha + behind * (255 - alpha) + 127) / 255) as u8
                 });
-                assert_eq!(rows.composite(pixel), expected, "channel {channel} at alpha {alpha}");
+                assert_eq!(conversion.composite(pixel), expected, "channel {channel} at alpha {alpha}");
             }
         }
     }
 
     #[test]
     fn sixteen_bit_channels_are_rounded_to_the_nearest_8_bit_value() {
-        let rows = Rows { profile: Profile::Srgb, background: [0; 3] };
+        let conversion = Conversion { profile: Profile::Srgb, background: [0; 3] };
         for channel in 0..=u16::MAX {
             let nearest = (f64::from(channel) / 257.0).round() as u8;
-            assert_eq!(rows.composite([channel, channel, channel, u16::MAX]), [nearest; 3], "channel {channel}");
+            assert_eq!(conversion.composite([channel, channel, channel, u16::MAX]), [nearest; 3], "channel {channel}");
         }
     }
 

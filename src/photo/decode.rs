@@ -1,11 +1,11 @@
-//! From a file's bytes to a [`Photo`]: limits first, then decode, colour, orientation and size.
+//! From a file's bytes to a [`Photo`]: check limits, decode, convert colours, turn upright and fit to size.
 
 use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, RgbImage, RgbaImage};
 use sha2::{Digest, Sha256};
 
 use super::{Photo, color, jpeg_segments, resize};
@@ -17,16 +17,17 @@ pub const SIDE_MAX_PX: u32 = 65_535;
 pub const PIXEL_COUNT_MAX: u64 = 1 << 28;
 /// Most bytes that a decoder may allocate: [`PIXEL_COUNT_MAX`] pixels of four floats.
 const DECODE_BYTES_MAX: u64 = PIXEL_COUNT_MAX * 16;
-/// Bytes per pixel while a picture is decoded, of up to eight: as it is stored, in sRGB, and turned upright.
+/// Bytes per pixel while a picture is decoded. A pixel takes up to eight as it is stored; copies of it are in sRGB and
+/// turned upright.
 const BYTES_PER_DECODED_PIXEL: u64 = 16;
 /// Most bytes of a file that is read.
 const FILE_BYTES_MAX: u64 = 1 << 32;
-/// Bytes that tell the format of every picture that is read.
+/// Bytes at the beginning of a file that are enough to recognise its format.
 const SIGNATURE_BYTES: u64 = 64;
 /// The formats that are read, for messages.
 const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP and GIF";
 
-/// What is behind a picture that is read.
+/// What lies behind a picture that is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Background {
     /// This 8-bit sRGB colour, which shows through where the picture is transparent.
@@ -46,21 +47,21 @@ impl Default for Background {
 pub struct ReadOptions {
     /// What shows where the picture is transparent; black unless asked otherwise.
     pub background: Background,
-    /// Size in px, at least 1, that the longer side is reduced to; smaller pictures stay as they are, and with `None`
+    /// Size in px, at least 1, to which the longer side is reduced. Smaller pictures keep their size, and with `None`
     /// all do.
     pub long_side_px: Option<u32>,
 }
 
-/// A picture that was read, and what is worth knowing about its file.
+/// A picture that was read, and facts about its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loaded {
     /// The picture: upright, in sRGB, fitted to size, over its background.
     pub photo: Photo,
-    /// Which pixels of `photo` are transparent, row by row: those of an alpha below 128 of 255. None if no pixel is, or if
-    /// the picture was read over a colour.
+    /// Which pixels of `photo` are transparent, row by row: those with an alpha below 128 of 255. `None` if no pixel
+    /// is, or if the picture was read over a colour.
     ///
-    /// These pixels are black. The others are over black as far as their alpha goes, and whatever colour the transparent
-    /// ones had is not in them.
+    /// These pixels are black. The others are composited on black, and no colour of a transparent pixel spills into
+    /// them.
     pub transparent: Option<Vec<bool>>,
     /// Width in px of the upright picture before it was fitted.
     pub original_width_px: u32,
@@ -68,37 +69,122 @@ pub struct Loaded {
     pub original_height_px: u32,
     /// SHA-256 of the file's bytes, 64 lower-case hexadecimal digits.
     pub sha256: String,
-    /// What was ignored in the file, one sentence each.
+    /// What was ignored in the file, one sentence for each thing.
     pub warnings: Vec<String>,
 }
 
-/// Reads the picture at `path`; its content, not its name, tells the format.
+/// Reads the picture at `path`. Its content decides the format, not its name.
 ///
 /// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
-/// background (on black if that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The bytes are the same on every machine,
-/// but for an ICC profile that has tables and no matrix: there a processor's fused multiplications may round a channel
-/// by one.
+/// background (on black if that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The pixels
+/// are the same on every machine, except under an ICC profile that has tables and no matrix: there a processor's fused
+/// multiplications may change a channel by one.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, or exceeds
 /// [`SIDE_MAX_PX`], [`PIXEL_COUNT_MAX`] or 4 GiB.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
-    let (format, bytes) = read_picture_file(path)?;
-    let mut warnings = Vec::new();
-    let upright =
-        decode(&bytes, format, options.background, &mut warnings).map_err(|reason| Error::input(path, reason))?;
-    let (original_width_px, original_height_px) = (upright.width(), upright.height());
-    let sha256 = sha256_hex(&bytes);
-    drop(bytes);
-    let (photo, transparent) = match upright {
-        DynamicImage::ImageRgba8(cut) => resize::fit_cut(&cut, options.long_side_px),
-        opaque => (resize::fit(&opaque.into_rgb8(), options.long_side_px), None),
-    };
-    Ok(Loaded { photo, transparent, original_width_px, original_height_px, sha256, warnings })
+    Decoded::read(path).map(|decoded| decoded.into_fitted(options))
 }
 
-/// About how many bytes it takes to decode the picture at `path`, by the size that its header tells; 0 if that is none, or one that
-/// is refused.
+/// A picture as it is stored, from which it can be fitted more than once.
+#[derive(Clone)]
+pub struct Decoded {
+    raw: Raw,
+    sha256: String,
+}
+
+impl Decoded {
+    /// Decodes the picture at `path`.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let (format, bytes) = read_picture_file(path)?;
+        Self::decode(&bytes, format).map_err(|reason| Error::input(path, reason))
+    }
+
+    /// Decodes the picture that a file of these bytes would hold.
+    ///
+    /// # Errors
+    /// A sentence without the picture's name, in the cases of [`read`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+        if bytes.is_empty() {
+            return Err("is empty (0 bytes)".to_owned());
+        }
+        let format = known_format(bytes).ok_or_else(|| format!("not a picture that can be read; {FORMATS} can"))?;
+        Self::decode(bytes, format)
+    }
+
+    /// A picture of 8-bit sRGB pixels, `channels` bytes each (3, or 4 with alpha that is not premultiplied), row by row
+    /// from the top. Its SHA-256 is that of the text `smalti CHANNELS WIDTHxHEIGHT`, a line break, and the bytes.
+    ///
+    /// # Errors
+    /// A sentence, if there are not as many bytes as the size says, or the size is none or exceeds [`SIDE_MAX_PX`] or
+    /// [`PIXEL_COUNT_MAX`].
+    pub fn from_pixels(width_px: u32, height_px: u32, channels: u8, bytes: &[u8]) -> Result<Self, String> {
+        check_size((width_px, height_px))?;
+        let expected = u64::from(width_px) * u64::from(height_px) * u64::from(channels);
+        if bytes.len() as u64 != expected {
+            let found = bytes.len();
+            return Err(format!("{width_px}x{height_px} px of {channels} channels are {expected} bytes, not {found}"));
+        }
+        let header = format!("smalti {channels} {width_px}x{height_px}\n");
+        let sha256 = hex(&Sha256::new().chain_update(header).chain_update(bytes).finalize());
+        let image = if channels == 4 {
+            RgbaImage::from_raw(width_px, height_px, bytes.to_vec()).map(DynamicImage::from)
+        } else {
+            RgbImage::from_raw(width_px, height_px, bytes.to_vec()).map(DynamicImage::from)
+        };
+        let image = image.ok_or_else(|| format!("pixels have 3 or 4 channels, not {channels}"))?;
+        Ok(Self { raw: Raw { image, profile: None, orientation: Orientation::NoTransforms }, sha256 })
+    }
+
+    fn decode(bytes: &[u8], format: ImageFormat) -> Result<Self, String> {
+        Ok(Self { raw: decode_raw(bytes, format)?, sha256: hex(&Sha256::digest(bytes)) })
+    }
+
+    /// Width and height in px of the upright picture.
+    #[must_use]
+    pub fn size_px(&self) -> (u32, u32) {
+        use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+        let (width_px, height_px) = (self.raw.image.width(), self.raw.image.height());
+        match self.raw.orientation {
+            Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH => (height_px, width_px),
+            _ => (width_px, height_px),
+        }
+    }
+
+    /// SHA-256 of the file's bytes, or of the pixels, 64 lower-case hexadecimal digits.
+    #[must_use]
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// The picture as [`read`] gives it.
+    #[must_use]
+    pub fn fitted(&self, options: &ReadOptions) -> Loaded {
+        self.clone().into_fitted(options)
+    }
+
+    /// As [`Decoded::fitted`], in less memory.
+    #[must_use]
+    pub fn into_fitted(self, options: &ReadOptions) -> Loaded {
+        let Self { raw, sha256 } = self;
+        let mut warnings = Vec::new();
+        let mut upright = color::to_srgb(raw.image, raw.profile.as_deref(), options.background, &mut warnings);
+        upright.apply_orientation(raw.orientation);
+        let (original_width_px, original_height_px) = (upright.width(), upright.height());
+        let (photo, transparent) = match upright {
+            DynamicImage::ImageRgba8(cut) => resize::fit_cut(&cut, options.long_side_px),
+            opaque => (resize::fit(&opaque.into_rgb8(), options.long_side_px), None),
+        };
+        Loaded { photo, transparent, original_width_px, original_height_px, sha256, warnings }
+    }
+}
+
+/// About how many bytes it takes to decode the picture at `path`, judged by the size in its header. 0 if there is no
+/// size, or if it is over the limits.
 #[must_use]
 pub fn decoding_bytes(path: &Path) -> u64 {
     let size = || {
@@ -127,7 +213,8 @@ pub(super) fn is_picture(path: &Path) -> Result<bool> {
     Ok(known_format(&signature).is_some())
 }
 
-/// Whether the file at `path` is a whole PNG, JPEG or WebP: its pixels can be decoded, and nothing is missing after them.
+/// Whether the file at `path` is a whole PNG, JPEG or WebP: its pixels can be decoded, and nothing is missing after
+/// them.
 #[must_use]
 pub fn is_whole(path: &Path) -> bool {
     let Ok((format, bytes)) = read_picture_file(path) else { return false };
@@ -143,12 +230,12 @@ pub fn is_whole(path: &Path) -> bool {
     has_its_end && decode_raw(&bytes, format).is_ok()
 }
 
-/// The bytes of the file at `path`, once its first bytes have shown that it is a picture.
+/// The format and the bytes of the file at `path`, if its first bytes show that it is a picture.
 pub(super) fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
     let unreadable = |error: io::Error| Error::input(path, why_unreadable(&error));
     let mut file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
-    // Not the whole file yet: `/dev/zero` has no end.
+    // Only the beginning: `/dev/zero` has no end.
     file.by_ref().take(SIGNATURE_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.is_empty() {
         return Err(Error::input(path, "the file is empty (0 bytes); get it again"));
@@ -157,7 +244,7 @@ pub(super) fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
         .ok_or_else(|| Error::input(path, format!("not a picture that can be read; {FORMATS} can")))?;
     file.take(FILE_BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > FILE_BYTES_MAX {
-        return Err(Error::input(path, "the file has more than 4 GiB, the most that is read; save a smaller version"));
+        return Err(Error::input(path, "the file is larger than the limit of 4 GiB; save a smaller version"));
     }
     Ok((format, bytes))
 }
@@ -172,7 +259,7 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
     }
 }
 
-/// The format that the first bytes of a file tell, if it is one that is read.
+/// The format that the first bytes of a file show, if it is one that is read.
 pub(super) fn known_format(bytes: &[u8]) -> Option<ImageFormat> {
     image::guess_format(bytes).ok().filter(|&format| is_read(format))
 }
@@ -182,20 +269,8 @@ fn is_read(format: ImageFormat) -> bool {
     matches!(format, Png | Jpeg | WebP | Tiff | Bmp | Gif)
 }
 
-/// The upright 8-bit sRGB picture in `bytes`, as [`color::to_srgb`] makes it, or a sentence that says why there is none.
-fn decode(
-    bytes: &[u8],
-    format: ImageFormat,
-    background: Background,
-    warnings: &mut Vec<String>,
-) -> Result<DynamicImage, String> {
-    let raw = decode_raw(bytes, format)?;
-    let mut image = color::to_srgb(raw.image, raw.profile.as_deref(), background, warnings);
-    image.apply_orientation(raw.orientation);
-    Ok(image)
-}
-
-/// What a decoder gives, and what is left to do to it.
+/// The output of a decoder, and what is still to be applied to it.
+#[derive(Clone)]
 pub(super) struct Raw {
     pub(super) image: DynamicImage,
     pub(super) profile: Option<Vec<u8>>,
@@ -209,7 +284,7 @@ pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat) -> Result<Raw, Strin
     reader.limits(limits());
     let mut decoder = reader.into_decoder().map_err(broken)?;
     check_size(decoder.dimensions())?;
-    // The JPEG decoder fills what is missing with grey and calls it a success.
+    // The JPEG decoder fills what is missing with grey and reports success.
     if format == ImageFormat::Jpeg && !jpeg_segments::is_complete(bytes) {
         return Err(broken_sentence(format, "its end is missing"));
     }
@@ -219,7 +294,7 @@ pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat) -> Result<Raw, Strin
     Ok(Raw { image, profile, orientation })
 }
 
-/// Refuses sizes that are nothing or too much, before anything of that size is allocated.
+/// Limits that make a decoder refuse a picture before it allocates too much memory.
 fn limits() -> Limits {
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(DECODE_BYTES_MAX);
@@ -228,7 +303,7 @@ fn limits() -> Limits {
 
 fn check_size((width_px, height_px): (u32, u32)) -> Result<(), String> {
     if width_px == 0 || height_px == 0 {
-        return Err(format!("the picture has no pixels ({width_px}x{height_px}); save it anew"));
+        return Err(format!("the picture has no pixels ({width_px}x{height_px}); save it again"));
     }
     if width_px.max(height_px) > SIDE_MAX_PX || u64::from(width_px) * u64::from(height_px) > PIXEL_COUNT_MAX {
         return Err(format!(
@@ -242,19 +317,19 @@ fn check_size((width_px, height_px): (u32, u32)) -> Result<(), String> {
 fn why_undecodable(format: ImageFormat, error: ImageError) -> String {
     match error {
         ImageError::Limits(_) => {
-            "the picture needs more than 4 GiB to decode, the most that is read; save a smaller version".to_owned()
+            "the picture needs more memory to decode than the limit of 4 GiB; save a smaller version".to_owned()
         }
         ImageError::Unsupported(error) => {
-            format!("this kind of {format:?} is not read ({error}); convert the picture to an 8-bit RGB PNG")
+            format!("this kind of {format:?} is not supported ({error}); convert the picture to an 8-bit RGB PNG")
         }
         error => broken_sentence(format, &error.to_string()),
     }
 }
 
 fn broken_sentence(format: ImageFormat, detail: &str) -> String {
-    format!("the {format:?} data is broken or cut short ({detail}); get the file again or save it anew")
+    format!("the {format:?} data is broken or cut short ({detail}); get the file or save it again")
 }
 
-fn sha256_hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -37,8 +37,8 @@ pub fn encode(format: Format, photo: &Photo, metadata: &Metadata) -> Result<Vec<
     }
 }
 
-/// The photo with an opacity per pixel, 0 to 255, as a file of this format; not premultiplied. A format without alpha
-/// shows it over black. Without `alpha` it is [`encode`].
+/// The photo as a file of this format, with an opacity per pixel, 0 to 255; not premultiplied. A format without alpha
+/// stores it over black. Without `alpha` this is [`encode`].
 ///
 /// # Errors
 /// As [`encode`], and [`Error::Internal`] if there is not one opacity per pixel.
@@ -89,15 +89,7 @@ fn png_bytes(
 ) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png_encoder(&mut bytes, size_px, color);
-    // The two kinds of chunk are written one after the other: with one kind the order stays.
-    let ascii = metadata.iter().all(|(_, text)| text.is_ascii());
-    for (keyword, text) in metadata.iter().cloned() {
-        if ascii {
-            encoder.add_text_chunk(keyword, text)?;
-        } else {
-            encoder.add_itxt_chunk(keyword, text)?;
-        }
-    }
+    metadata::add_to_png(&mut encoder, metadata)?;
     let mut writer = encoder.write_header()?;
     writer.write_image_data(samples)?;
     writer.finish()?;

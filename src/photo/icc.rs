@@ -1,8 +1,9 @@
 //! ICC profiles: what the numbers of a picture mean, turned into sRGB.
 //!
-//! Cameras, editors and phones embed curves and a matrix. Those are evaluated here, in double precision and with the
-//! powers of `libm`: `moxcms` fuses multiplications where the processor can, and so rounds differently from machine to
-//! machine. It still parses every profile, and evaluates the rare ones that are only tables, such as scanners'.
+//! Cameras, editors and phones embed curves and a matrix. These are evaluated here, in double precision and with the
+//! powers of `libm`, because `moxcms` fuses multiplications where the processor can and so rounds differently on
+//! different machines. `moxcms` still parses every profile, and evaluates the rare ones that have only tables, such as
+//! those of scanners.
 
 use std::sync::Arc;
 
@@ -15,8 +16,8 @@ const SRGB_FROM_XYZ: [[f64; 3]; 3] = [
     [0.071_945_3, -0.228_991_4, 1.405_242_7],
 ];
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-/// Profiles round the primaries of sRGB in their own ways. What is as near as this to sRGB is taken as sRGB, so that
-/// the commonest profile of all changes no pixel.
+/// Profiles round the primaries of sRGB in different ways. A profile this close to sRGB counts as sRGB, so that the
+/// most common profile of all changes no pixel.
 const SRGB_TOLERANCE: f64 = 1e-3;
 /// Steps of a 16-bit channel.
 const STEPS: usize = 65_535;
@@ -27,12 +28,12 @@ pub(super) enum Profile {
     Srgb,
     /// By curves and a matrix.
     Shaper(Box<Shaper>),
-    /// By tables.
+    /// By tables, which `moxcms` evaluates.
     Tables(Arc<Transform16BitExecutor>),
 }
 
 impl Profile {
-    /// The profile in `icc` for a picture that has colour or is grey, or why it cannot be used.
+    /// The profile in `icc` for a picture that has colour or is grey, or the reason why it cannot be used.
     pub(super) fn parse(icc: &[u8], has_color: bool) -> Result<Self, String> {
         let profile = ColorProfile::new_from_slice(icc).map_err(|error| format!("it is broken ({error})"))?;
         match (profile.color_space, has_color) {
@@ -66,9 +67,9 @@ impl Profile {
     }
 }
 
-/// A profile of three curves and a matrix; a grey profile is one of equal curves and the identity.
+/// A profile of three curves and a matrix. A grey profile has equal curves and the identity.
 pub(super) struct Shaper {
-    /// Linear light in [0, 1] of each 16-bit channel value.
+    /// For each channel, the linear light in [0, 1] of every 16-bit value.
     linear: [Vec<f64>; 3],
     /// Linear sRGB from the profile's linear channels.
     matrix: [[f64; 3]; 3],

@@ -22,13 +22,12 @@ struct Segment<'a> {
 
 /// The first segment at or after `from`, or `None` where the bytes end before it does.
 ///
-/// Entropy-coded bytes and fill bytes are passed over by the same rule: a marker is 0xFF and a byte that is neither 0
-/// nor 0xFF.
+/// One rule skips entropy-coded bytes and fill bytes: a marker is 0xFF followed by a byte that is neither 0 nor 0xFF.
 fn next_segment(bytes: &[u8], from: usize) -> Option<Segment<'_>> {
     let offset = bytes.get(from..)?.windows(2).position(|pair| pair[0] == 0xFF && !matches!(pair[1], 0 | 0xFF))?;
     let body = from + offset + 2;
     let marker = bytes[body - 1];
-    // TEM, RST0 to RST7, SOI and EOI stand alone.
+    // TEM, RST0 to RST7, SOI and EOI have no payload.
     if matches!(marker, 0x01 | 0xD0..=END_OF_IMAGE) {
         return Some(Segment { marker, payload: &[], end: body });
     }
@@ -46,7 +45,7 @@ fn segments(bytes: &[u8]) -> impl Iterator<Item = Segment<'_>> {
     })
 }
 
-/// Whether the file goes on to the end of its image.
+/// Whether the file holds the end of its image.
 pub(super) fn is_complete(bytes: &[u8]) -> bool {
     segments(bytes).any(|segment| segment.marker == END_OF_IMAGE)
 }
@@ -69,7 +68,7 @@ pub(super) fn comment(keyword: &str, text: &str) -> Vec<u8> {
     segment
 }
 
-/// Where comments go: after the start of the image and, where there is one, the JFIF header.
+/// Where comments go: after the start of the image and the JFIF header, if there is one.
 pub(super) fn header_end(bytes: &[u8]) -> usize {
     segments(bytes)
         .take_while(|segment| matches!(segment.marker, START_OF_IMAGE | APP0))

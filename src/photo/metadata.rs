@@ -1,7 +1,7 @@
-//! Metadata of the pictures that we write: keywords and texts that tell how a picture came to be.
+//! Metadata of the pictures that we write: keywords and texts that say how a picture was made.
 //!
-//! A PNG carries each entry as a text chunk, a JPEG as a comment `keyword=text`, a WebP in an XMP packet. Reading needs no pixels, so a file's
-//! key is known without decoding it.
+//! A PNG carries each entry as a text chunk, a JPEG as a comment `keyword=text`, a WebP in an XMP packet. Reading it
+//! needs no pixels, so the key of a file is known without decoding the file.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -13,16 +13,16 @@ use crate::error::{Error, Result};
 
 /// Keywords with their texts, in the order in which they are written.
 ///
-/// A keyword has 1 to 79 printable ASCII characters, no `=`, no space at its ends. A text has no NUL; together with its
-/// keyword it has at most 65,532 bytes.
+/// A keyword has 1 to 79 printable ASCII characters, no `=`, and no space at either end. A text has no NUL, and at most
+/// 65,532 bytes together with its keyword.
 pub type Metadata = Vec<(String, String)>;
 
-/// Bytes of a file in which its metadata is looked for; ours begins within the first hundred.
+/// Metadata is searched for in this many bytes of a file; ours begins within the first hundred.
 const HEADER_BYTES: u64 = 1 << 20;
 const PNG_SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 const JPEG_SIGNATURE: [u8; 3] = [0xFF, 0xD8, 0xFF];
 
-/// Refuses entries that one of the formats could not carry and give back unchanged.
+/// Refuses entries that one of the formats could not store and return unchanged.
 pub(super) fn check(metadata: &Metadata) -> Result<()> {
     for (keyword, text) in metadata {
         let printable = keyword.bytes().all(|byte| matches!(byte, b' '..=b'~') && byte != b'=');
@@ -35,6 +35,24 @@ pub(super) fn check(metadata: &Metadata) -> Result<()> {
         if text.contains('\0') || keyword.len() + 1 + text.len() > jpeg_segments::PAYLOAD_BYTES_MAX {
             let reason = format!("{keyword:?} is longer than 65,532 bytes or holds a NUL");
             return Err(Error::parameter("metadata", reason));
+        }
+    }
+    Ok(())
+}
+
+/// Gives a PNG its metadata as text chunks.
+pub(super) fn add_to_png(
+    encoder: &mut png::Encoder<'_, &mut Vec<u8>>,
+    metadata: &Metadata,
+) -> Result<(), png::EncodingError> {
+    // The encoder writes all chunks of one kind before those of the other, so a single kind keeps the order of the
+    // entries.
+    let ascii = metadata.iter().all(|(_, text)| text.is_ascii());
+    for (keyword, text) in metadata.iter().cloned() {
+        if ascii {
+            encoder.add_text_chunk(keyword, text)?;
+        } else {
+            encoder.add_itxt_chunk(keyword, text)?;
         }
     }
     Ok(())
@@ -53,7 +71,7 @@ pub fn read_metadata(path: &Path) -> Result<Metadata> {
     if header.starts_with(&PNG_SIGNATURE) { Ok(png_metadata(&header)) } else { Ok(jpeg_metadata(&header)) }
 }
 
-/// The text chunks ahead of the pixels of the PNG file at `path`; empty if it is not a PNG or has none.
+/// The text chunks before the pixels of the PNG file at `path`; empty if it is not a PNG or has none.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read.
@@ -77,7 +95,7 @@ fn read_header(path: &Path) -> Result<Vec<u8>> {
     Ok(header)
 }
 
-/// The text chunks ahead of the pixels of a PNG file that begins with `header`; empty if that is no PNG.
+/// The text chunks before the pixels of a PNG file that begins with `header`; empty if it is not a PNG.
 pub(crate) fn png_metadata(header: &[u8]) -> Metadata {
     let limits = png::Limits { bytes: HEADER_BYTES as usize };
     let Ok(reader) = png::Decoder::new_with_limits(std::io::Cursor::new(header), limits).read_info() else {

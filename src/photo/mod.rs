@@ -1,8 +1,8 @@
 //! Pictures in and out: decode, bring upright and to sRGB, fit to size, encode; and the metadata in what we wrote.
 //!
-//! The only user of the image crates. Every step gives the same bytes on every machine and with any number of threads,
-//! since the pixels decide all that evolves from them; a test holds hashes of decoded pictures. Knows no fly and no
-//! target.
+//! The only user of the image crates. The pixels decide everything that evolves from them, so every step gives the same
+//! bytes on every machine and with any number of threads; a test compares decoded pictures with known hashes. Knows no
+//! fly and no target.
 
 mod animation;
 mod color;
@@ -20,7 +20,9 @@ pub(crate) mod xml;
 
 pub use animation::{ApngEncoder, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
 pub(crate) use decode::why_unreadable;
-pub use decode::{Background, Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, decoding_bytes, is_whole, read};
+pub use decode::{
+    Background, Decoded, Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, decoding_bytes, is_whole, read,
+};
 pub use encode::{Format, encode, encode_jpeg, encode_png, encode_png_with_alpha, encode_webp, encode_with_alpha};
 pub(crate) use metadata::png_metadata;
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
@@ -28,7 +30,7 @@ pub use palette::{COLOR_COUNT_MAX, palette_of, read_palette, reduce};
 pub use resize::fitted;
 pub use stencil::{Stencil, decode_stencil, is_picture};
 pub use webp::WEBP_SIDE_MAX_PX;
-pub use weights::read_weights;
+pub use weights::{decode_weights, read_weights};
 
 /// A picture in memory: 8-bit sRGB, no alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]

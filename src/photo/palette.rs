@@ -1,7 +1,7 @@
 //! Few colours: palettes made from a picture or read from a file, and pictures reduced to them.
 //!
-//! The paper's even schemes evolve towards pictures of 60 colours (Table 1). All distances are between stored 8-bit sRGB
-//! values, in integers, so that every machine reduces a picture to the same pixels.
+//! In the paper, the schemes with even numbers evolve towards pictures of 60 colours (Table 1). All distances are
+//! between stored 8-bit sRGB values, in integers, so that every machine reduces a picture to the same pixels.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -22,8 +22,8 @@ pub const COLOR_COUNT_MAX: usize = 256;
 /// Most bytes of a palette file in text form.
 const TEXT_BYTES_MAX: u64 = 1 << 20;
 
-/// The `color_count` colours (1 to [`COLOR_COUNT_MAX`]) that stand best for those of `pixels`, in rising order: Wu's
-/// quantiser, or their own colours if there are no more than that.
+/// The `color_count` colours (1 to [`COLOR_COUNT_MAX`]) that represent `pixels` best, in rising order. They come from
+/// Wu's quantiser, or are the pixels' own colours if there are no more than `color_count`.
 ///
 /// # Errors
 /// [`Error::Parameter`] if there are no pixels.
@@ -58,10 +58,10 @@ fn distinct_colors(pixels: &[[u8; 3]], count_max: usize) -> Option<Vec<[u8; 3]>>
     Some(colors)
 }
 
-/// Gives every pixel of `photo` the nearest colour of `palette`, which must not be empty: least squared distance of the
-/// 8-bit channels, of equals the first.
+/// Gives every pixel of `photo` the nearest colour of `palette`, which must not be empty. The nearest colour has the
+/// least squared distance of the 8-bit channels; among equals, the first one wins.
 pub fn reduce(photo: &mut Photo, palette: &[[u8; 3]]) {
-    // Neighbours are often equal, and a search takes up to 256 comparisons.
+    // Neighbouring pixels are often equal, and a search takes up to 256 comparisons.
     let mut last = None;
     for pixel in &mut photo.pixels {
         let nearest = match last {
@@ -81,7 +81,7 @@ pub(super) fn nearest(color: [u8; 3], palette: &[[u8; 3]]) -> [u8; 3] {
 }
 
 /// The palette in the file at `path`: a picture's colours in reading order, a GIMP palette (`.gpl`), a JASC palette
-/// (`.pal`), or lines of hexadecimal RRGGBB (`.hex`). A colour that comes again is left out.
+/// (`.pal`), or lines of hexadecimal RRGGBB (`.hex`). Repeated colours are left out.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, is none of these, or has no colour or more than [`COLOR_COUNT_MAX`].
@@ -100,7 +100,8 @@ pub fn read_palette(path: &Path) -> Result<Vec<[u8; 3]>> {
         .map_err(|error| refused(why_unreadable(&error)))?;
     let listed = parse_palette(&String::from_utf8_lossy(&bytes)).map_err(|line| {
         refused(format!(
-            "is no palette: line {line} is no colour; use a GIMP palette, a JASC palette, lines of RRGGBB, or a picture"
+            "is not a palette: line {line} is not a colour; use a GIMP palette, a JASC palette, \
+             lines of RRGGBB, or a picture"
         ))
     })?;
     match distinct_colors(&listed, COLOR_COUNT_MAX) {
@@ -112,7 +113,7 @@ pub fn read_palette(path: &Path) -> Result<Vec<[u8; 3]>> {
     }
 }
 
-/// The colours of a palette in text form, or the number of the first line that is none.
+/// The colours of a palette in text form, or the number of the first line that holds no colour.
 fn parse_palette(text: &str) -> Result<Vec<[u8; 3]>, usize> {
     let first = text.lines().next().unwrap_or_default().trim_start_matches('\u{feff}').trim();
     let is_gimp = first == "GIMP Palette";
@@ -138,7 +139,7 @@ fn parse_palette(text: &str) -> Result<Vec<[u8; 3]>, usize> {
     Ok(colors)
 }
 
-/// `R G B` with a name after them or none.
+/// `R G B`, perhaps with a name after them.
 fn parse_decimal(line: &str) -> Option<[u8; 3]> {
     let mut channels = line.split_whitespace().map(|word| word.parse::<u8>().ok());
     Some([channels.next()??, channels.next()??, channels.next()??])

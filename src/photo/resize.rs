@@ -1,7 +1,7 @@
 //! Reducing a picture with Lanczos3.
 //!
-//! The kernel's sine is that of `libm`, and the sums are single-precision floats in a fixed order, without SIMD and
-//! without fused steps, so the pixels do not depend on the machine.
+//! The kernel uses the sine of `libm`. The sums are single-precision floats in a fixed order, without SIMD and without
+//! fused operations, so the pixels do not depend on the machine.
 
 use std::f64::consts::PI;
 
@@ -18,12 +18,13 @@ const OPAQUE_FROM: u8 = 128;
 
 /// The picture with its longer side reduced to `long_side_px`; the same picture if it is not longer than that.
 pub(super) fn fit(image: &RgbImage, long_side_px: Option<u32>) -> Photo {
-    // A view, since a copy of the largest picture that is read takes most of a GiB.
+    // A view instead of a copy, which would take most of a GiB for the largest picture.
     let (source, _) = image.as_raw().as_chunks::<3>();
     fit_pixels(source, image.dimensions(), long_side_px)
 }
 
-/// `photo` with its longer side reduced to `long_side_px`, at least 1, by Lanczos3; a copy if it is not longer than that.
+/// `photo` with its longer side reduced to `long_side_px`, at least 1, by Lanczos3; a copy if it is not longer than
+/// that.
 #[must_use]
 pub fn fitted(photo: &Photo, long_side_px: u32) -> Photo {
     fit_pixels(&photo.pixels, (photo.width_px, photo.height_px), Some(long_side_px))
@@ -37,10 +38,10 @@ fn fit_pixels(source: &[[u8; 3]], size_px: (u32, u32), long_side_px: Option<u32>
     Photo { width_px, height_px, pixels: resized(source, size_px, (width_px, height_px), Channels) }
 }
 
-/// The picture with its longer side reduced to `long_side_px`, over black, and which of its pixels are transparent, if any
-/// is. The colours of `image` are already over black.
+/// The picture over black, with its longer side reduced to `long_side_px`, and which of its pixels are transparent, if
+/// any are. The colours of `image` are already over black.
 ///
-/// Each pixel weighs as much as it is opaque: what is transparent gives its neighbours no colour, not even black.
+/// Each pixel is weighted by its opacity, so transparent pixels give their neighbours no colour, not even black.
 pub(super) fn fit_cut(image: &RgbaImage, long_side_px: Option<u32>) -> (Photo, Option<Vec<bool>>) {
     let (source, _) = image.as_raw().as_chunks::<4>();
     let (width_px, height_px) = fitted_size(image.dimensions(), long_side_px);
@@ -56,7 +57,7 @@ pub(super) fn fit_cut(image: &RgbaImage, long_side_px: Option<u32>) -> (Photo, O
     (photo, transparent)
 }
 
-/// The luma of a picture, row by row, at another size, larger or smaller, by Lanczos3.
+/// The luma of a picture, row by row, at another size (larger or smaller), by Lanczos3.
 pub(super) fn fit_luma(image: &GrayImage, (width_px, height_px): (u32, u32)) -> Vec<u8> {
     if (width_px, height_px) == image.dimensions() {
         return image.as_raw().clone();
@@ -78,7 +79,7 @@ where
     pixels
 }
 
-/// Pixels as arrays; the arithmetic is that of [`Pixel::RGB8`].
+/// Pixels as arrays, with the arithmetic of [`Pixel::RGB8`].
 struct Channels;
 
 impl PixelFormat for Channels {
@@ -106,7 +107,7 @@ impl PixelFormat for Channels {
     }
 }
 
-/// Colours that weigh as much as their alpha, and the alpha itself.
+/// Colours weighted by their alpha, and the alpha itself.
 struct Weighed;
 
 impl PixelFormat for Weighed {
@@ -128,7 +129,7 @@ impl PixelFormat for Weighed {
     }
 
     fn into_pixel(&self, [r, g, b, alpha]: [f32; 4]) -> [u8; 4] {
-        // A pixel of no alpha has no colour: 0/0 becomes 0.
+        // A pixel with alpha 0 has no colour: 0/0 becomes 0.
         [r / alpha, g / alpha, b / alpha, alpha].map(rounded)
     }
 }
@@ -163,7 +164,8 @@ fn rounded(value: f32) -> u8 {
     (value + 0.5) as u8
 }
 
-/// The size in px that fits: the longer side is `long_side_px`, the other is rounded half up, and none is below 1 px.
+/// The fitted size in px: the longer side is `long_side_px`, the other one is rounded half up, and neither is below 1
+/// px.
 pub(super) fn fitted_size((width_px, height_px): (u32, u32), long_side_px: Option<u32>) -> (u32, u32) {
     let longer_px = u64::from(width_px.max(height_px));
     let fitted_px = u64::from(long_side_px.unwrap_or(u32::MAX).max(1)).min(longer_px);

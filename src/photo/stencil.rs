@@ -1,4 +1,4 @@
-//! Pictures of which only brightness and transparency count.
+//! Pictures reduced to brightness and transparency.
 
 use image::DynamicImage;
 
@@ -12,12 +12,12 @@ pub struct Stencil {
     pub width_px: u32,
     /// Height in px, at least 1.
     pub height_px: u32,
-    /// Luma of the colour without its alpha, and alpha (255 if the picture has none), of every pixel, row by row from the
-    /// top; `width_px * height_px` of them.
+    /// Luma of the colour without its alpha, and alpha (255 if the picture has none), of every pixel, row by row from
+    /// the top; `width_px * height_px` of them.
     pub pixels: Vec<[u8; 2]>,
 }
 
-/// Whether the first of these bytes are those of a format that is read.
+/// Whether these bytes begin like a picture of a format that is read.
 #[must_use]
 pub fn is_picture(bytes: &[u8]) -> bool {
     known_format(bytes).is_some()
@@ -26,8 +26,8 @@ pub fn is_picture(bytes: &[u8]) -> bool {
 /// The upright picture in the bytes of a file, of an animation the first frame.
 ///
 /// # Errors
-/// A sentence for the user, without the file's name, if the bytes are not one of the formats, are broken or cut short, or
-/// exceed [`super::SIDE_MAX_PX`] or [`super::PIXEL_COUNT_MAX`].
+/// A sentence for the user, without the file's name, if the bytes are not one of the formats, are broken or cut short,
+/// or exceed [`super::SIDE_MAX_PX`] or [`super::PIXEL_COUNT_MAX`].
 pub fn decode_stencil(bytes: &[u8]) -> Result<Stencil, String> {
     let format = known_format(bytes).ok_or("not a picture that can be read; convert it to PNG")?;
     let raw = decode_raw(bytes, format)?;

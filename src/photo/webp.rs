@@ -1,4 +1,4 @@
-//! The chunks of a WebP file (RFC 9649): enough to put metadata behind a lossless picture, and to find it again.
+//! The chunks of a WebP file (RFC 9649): enough to append metadata to a lossless picture, and to find it again.
 //!
 //! The metadata is an XMP packet: a list of `keyword=text`.
 
@@ -67,7 +67,7 @@ fn packet(metadata: &Metadata) -> String {
 
 /// The metadata in a WebP file; empty if it has none of ours.
 ///
-/// The packet lies behind the picture, so the chunks before it are stepped over, not read.
+/// The packet lies behind the picture, so the chunks before it are skipped, not read.
 pub(super) fn metadata(mut file: impl Read + Seek) -> io::Result<Metadata> {
     file.seek(SeekFrom::Start(HEADER_BYTES as u64))?;
     let mut header = [0; 8];
@@ -114,7 +114,7 @@ mod tests {
                 damaged[cut] = value;
                 metadata(Cursor::new(damaged)).expect("memory can be read");
             }
-            // The last byte may only fill up the last chunk.
+            // The last byte may be mere padding of the last chunk.
             let is_cut = cut < whole.len() - 1;
             let found = metadata(Cursor::new(&whole[..cut])).expect("memory can be read");
             assert!(!is_cut || found.is_empty(), "cut to {cut} of {} bytes", whole.len());

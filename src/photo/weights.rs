@@ -1,43 +1,53 @@
-//! Maps that tell where a picture matters.
+//! Maps that say where a picture matters.
 
 use std::path::Path;
 
-use image::DynamicImage;
+use image::{DynamicImage, ImageFormat};
 
-use super::decode::{decode_raw, read_picture_file};
+use super::decode::{decode_raw, known_format, read_picture_file};
 use super::{color, resize};
 use crate::error::{Error, Result};
 
-/// The luma of the map at `path` at the size of the picture that it is for, row by row from the top; 0 is where the
-/// picture matters least and 255 where it matters most.
+/// The luma of the map at `path`, resized to the size of its picture, row by row from the top. 0 is where the picture
+/// matters least and 255 where it matters most.
 ///
-/// Any picture that is read can be a map: grey is taken as it is stored, colours by their luma, what is transparent as
+/// Any picture that can be read can be a map. Grey counts as it is stored, colours by their luma, transparency as
 /// black; EXIF orientation is applied. The bytes are the same on every machine.
 ///
 /// # Errors
-/// [`Error::Input`] if the file cannot be read, as for [`super::read`], or if its proportions are not those of the
-/// picture, to a pixel at the smaller of both sizes.
+/// [`Error::Input`] if the file cannot be read, as for [`super::read`], or if its proportions differ from those of the
+/// picture by more than a pixel at the smaller of the two sizes.
 pub fn read_weights(path: &Path, width_px: u32, height_px: u32) -> Result<Vec<u8>> {
     let (format, bytes) = read_picture_file(path)?;
-    let raw = decode_raw(&bytes, format).map_err(|reason| Error::input(path, reason))?;
-    drop(bytes);
+    weights(&bytes, format, (width_px, height_px)).map_err(|reason| Error::input(path, reason))
+}
+
+/// As [`read_weights`], of the map that a file of these bytes would hold.
+///
+/// # Errors
+/// A sentence without the map's name.
+pub fn decode_weights(bytes: &[u8], width_px: u32, height_px: u32) -> Result<Vec<u8>, String> {
+    let format = known_format(bytes).ok_or_else(|| "not a picture that can be read".to_owned())?;
+    weights(bytes, format, (width_px, height_px))
+}
+
+fn weights(bytes: &[u8], format: ImageFormat, size_px: (u32, u32)) -> Result<Vec<u8>, String> {
+    let raw = decode_raw(bytes, format)?;
     let mut map = DynamicImage::ImageLuma8(color::to_luma_over_black(raw.image, raw.profile.as_deref()));
     map.apply_orientation(raw.orientation);
     let map = map.into_luma8();
-    let size_px = (width_px, height_px);
     if !has_proportions_of(map.dimensions(), size_px) {
-        let (map_width_px, map_height_px) = map.dimensions();
-        let reason = format!(
+        let ((map_width_px, map_height_px), (width_px, height_px)) = (map.dimensions(), size_px);
+        return Err(format!(
             "a map of {map_width_px}x{map_height_px} px does not fit a picture of {width_px}x{height_px} px; give it the \
              picture's proportions"
-        );
-        return Err(Error::input(path, reason));
+        ));
     }
     Ok(resize::fit_luma(&map, size_px))
 }
 
-/// Whether two sizes in px have the same proportions: the larger, reduced to the longer side of the smaller, is like the
-/// smaller to a pixel.
+/// Whether two sizes in px have the same proportions: reduced to the longer side of the smaller one, the larger one
+/// differs from it by at most a pixel.
 fn has_proportions_of(one: (u32, u32), other: (u32, u32)) -> bool {
     let long_side_px = |(width_px, height_px): (u32, u32)| width_px.max(height_px);
     let (small, large) = if long_side_px(one) <= long_side_px(other) { (one, other) } else { (other, one) };

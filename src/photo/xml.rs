@@ -1,4 +1,4 @@
-//! Text inside XML, for the files whose metadata is XML.
+//! Text inside XML, for files whose metadata is XML.
 
 /// `text` as the content of an element.
 pub(crate) fn escape(text: &str) -> String {
@@ -8,7 +8,7 @@ pub(crate) fn escape(text: &str) -> String {
             '&' => escaped.push_str("&amp;"),
             '<' => escaped.push_str("&lt;"),
             '>' => escaped.push_str("&gt;"),
-            // Readers turn a bare one into a line feed.
+            // XML parsers turn a bare carriage return into a line feed.
             '\r' => escaped.push_str("&#13;"),
             char => escaped.push(char),
         }
@@ -21,7 +21,8 @@ pub(crate) fn unescape(escaped: &str) -> String {
     escaped.replace("&#13;", "\r").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
 }
 
-/// The contents of all elements `<name>..</name>` of `document`, which have no attributes and none of their kind inside.
+/// The contents of all elements `<name>..</name>` of `document`. They must have no attributes and no element of the
+/// same name inside.
 pub(crate) fn contents<'a>(document: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
     let (open, close) = (format!("<{name}>"), format!("</{name}>"));
     let mut rest = document;

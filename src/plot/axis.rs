@@ -1,6 +1,7 @@
 //! An axis: from values to pixels, and where its ticks are.
 //!
-//! Own ticks and `libm`'s logarithm, so that no platform's rounding moves a line or drops a tick.
+//! Ticks are computed here, and the logarithm is that of `libm`, so no platform's rounding moves a line or drops a
+//! tick.
 
 use std::ops::Range;
 
@@ -17,7 +18,8 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// The scale that shows these values best: logarithmic if all are at least 1 and they span a factor of five or more.
+    /// The scale that shows these values best: logarithmic if all are at least 1 and they span a factor of five or
+    /// more.
     #[must_use]
     pub fn fitting(values: impl Iterator<Item = f64>) -> Self {
         let (least, most) = extremes(values);
@@ -43,7 +45,7 @@ impl Axis {
         Self { scale, from: least, to }
     }
 
-    /// The same with room at the end; a linear axis of values that are not negative begins at 0.
+    /// The same axis with room at its end. A linear axis begins at 0 if no value is negative.
     pub(super) fn with_room(self) -> Self {
         match self.scale {
             Scale::Linear if self.from >= 0.0 => Self { from: 0.0, to: self.to * 1.08, ..self },
@@ -63,7 +65,7 @@ impl Axis {
         }
     }
 
-    /// The ticks, at most about `most`, at 1, 2 or 5 times a power of ten.
+    /// The ticks: at most about `most` round numbers.
     fn ticks(&self, most: usize) -> Vec<f64> {
         match self.scale {
             Scale::Linear => {
@@ -156,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_told_shortly() {
+    fn numbers_are_written_shortly() {
         assert_eq!(
             [0.0, 0.05, 999.0, 40_000.0, 2_500_000.0, -1.5e9].map(short_number),
             ["0", "0.05", "999", "40k", "2.5M", "-1.5G"]

@@ -1,7 +1,7 @@
 //! Plots as SVG text: series of points over two axes, with vertical marks.
 //!
-//! The same points give the same text on every machine: nothing here asks for fonts, and the reader's program sets the
-//! type. Nothing here knows what is plotted, or where it is written.
+//! The same points give the same text on every machine: the SVG embeds no font, so the program that shows it chooses
+//! one. Nothing here knows what is plotted, or where it is written.
 
 mod axis;
 
@@ -15,7 +15,8 @@ use axis::{Axis, short_number};
 /// Width and height of a plot in px.
 pub const SIZE_PX: (u32, u32) = (960, 540);
 
-/// Ink, then one colour per series, told apart by colour-blind people too (Okabe and Ito, "Color Universal Design", 2008).
+/// Ink, then one colour per series, told apart by colour-blind people too (Okabe and Ito, "Color Universal Design",
+/// 2008).
 const INK: RGBColor = RGBColor(40, 40, 40);
 const GRID: RGBColor = RGBColor(225, 225, 225);
 const MARK: RGBColor = RGBColor(150, 150, 150);
@@ -36,7 +37,7 @@ const CHARACTER_PX: i32 = 7;
 /// A line through points, in the order given.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Its name in the legend, which is there if there are several.
+    /// Its name in the legend. There is a legend only if there are several series.
     pub label: String,
     /// Its points (x, y), all finite.
     pub points: Vec<(f64, f64)>,
@@ -47,20 +48,20 @@ pub struct Series {
 pub struct Mark {
     /// Where it is.
     pub x: f64,
-    /// Left out where the label before it has no room to end.
+    /// The label, left out where it would overlap the one before.
     pub label: String,
 }
 
 /// What to plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// Above the plot.
+    /// The title above the plot.
     pub title: String,
-    /// Below the horizontal axis.
+    /// The label below the horizontal axis.
     pub x_label: String,
-    /// Beside the vertical axis.
+    /// The label beside the vertical axis.
     pub y_label: String,
-    /// How the vertical axis is divided; [`Scale::fitting`] chooses.
+    /// How the vertical axis is divided; [`Scale::fitting`] chooses a scale.
     pub y_scale: Scale,
     /// The lines.
     pub series: Vec<Series>,
@@ -76,7 +77,7 @@ impl Plot {
     pub fn svg(&self) -> Result<String> {
         let mut text = String::new();
         self.draw(&mut text).map_err(|reason| Error::Internal(format!("the plot `{}`: {reason}", self.title)))?;
-        // A title may be the name of a file, which may hold anything.
+        // A title may be the name of a file, which may hold any character.
         text.retain(is_xml);
         Ok(text)
     }

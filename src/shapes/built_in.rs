@@ -1,9 +1,9 @@
-//! The templates that come with smalti: their names, and what is said about them.
+//! The templates that come with smalti: their names, descriptions and drawings.
 
 use std::fmt;
 use std::str::FromStr;
 
-use super::template::{Source, Template};
+use super::ink::Ink;
 use super::{brush, outlines};
 use crate::error::{Error, Result};
 
@@ -34,7 +34,7 @@ impl BuiltIn {
     pub const ALL: [Self; 8] =
         [Self::Square, Self::Border, Self::Lines, Self::Flower, Self::Disc, Self::Triangle, Self::Hexagon, Self::Brush];
 
-    /// The name, as it is typed.
+    /// The name that users type.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -64,10 +64,9 @@ impl BuiltIn {
         }
     }
 
-    /// The drawing; always the same texels.
-    #[must_use]
-    pub fn template(self) -> Template {
-        let ink = match self {
+    /// The ink of its texels, row by row.
+    pub(super) fn drawing(self) -> Vec<Ink> {
+        match self {
             Self::Square => outlines::square(),
             Self::Border => outlines::border(),
             Self::Lines => outlines::lines(),
@@ -76,8 +75,7 @@ impl BuiltIn {
             Self::Triangle => outlines::triangle(),
             Self::Hexagon => outlines::hexagon(),
             Self::Brush => brush::stroke(),
-        };
-        Template::new(Source::BuiltIn(self), ink)
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! How far inside a drawing each texel lies: an exact Euclidean distance transform in integers (Meijster, Roerdink and
 //! Hesselink, "A general algorithm for computing distance transforms in linear time", 2000).
 
-use super::template::Ink;
+use super::ink::Ink;
 use crate::model::mask::MASK_SIDE;
 
 /// Units of a depth per texel.
@@ -9,17 +9,18 @@ pub(super) const DEPTH_PER_TEXEL: i64 = 16;
 
 const SIDE: i64 = MASK_SIDE as i64;
 
-/// Per texel the distance from its centre to the drawing's edge, in 1/[`DEPTH_PER_TEXEL`] texel; 0 outside the drawing.
+/// For each texel, the distance from its centre to the drawing's edge, in 1/[`DEPTH_PER_TEXEL`] texel; 0 outside the
+/// drawing.
 #[derive(Clone, Debug)]
 pub(super) struct Depth {
     texels: Vec<i64>,
 }
 
 impl Depth {
-    /// The depths of a drawing; what lies outside the square is a hole.
+    /// The depths of a drawing; everything outside the square counts as a hole.
     ///
-    /// A texel is inside where its alpha is at least a quarter of full, so that thin paint is no hole, or half of the
-    /// highest if no texel is that opaque.
+    /// A texel is inside the drawing if its alpha is at least a quarter, so that thin paint is no hole. If no texel is
+    /// that opaque, half of the highest alpha is enough.
     pub(super) fn of(ink: &[Ink]) -> Self {
         let highest = ink.iter().map(|ink| ink.alpha).max().unwrap_or_default();
         let threshold = (highest / 2 + 1).min(64);
@@ -27,7 +28,7 @@ impl Depth {
         let mut texels = Vec::with_capacity(ink.len());
         for row in to_hole_above_or_below.chunks_exact(MASK_SIDE) {
             texels.extend(row_distances(row).into_iter().map(|square| {
-                // From centre to centre, so the edge between them is half a texel nearer.
+                // The distance is from centre to centre, and the edge lies half a texel before the hole's centre.
                 ((square * DEPTH_PER_TEXEL * DEPTH_PER_TEXEL).isqrt() - DEPTH_PER_TEXEL / 2).max(0)
             }));
         }
@@ -45,7 +46,7 @@ impl Depth {
     }
 }
 
-/// Per texel the distance to the nearest hole in its column.
+/// For each texel, the distance to the nearest hole in its column.
 fn column_distances(is_inside: impl Fn(usize) -> bool) -> Vec<i64> {
     let mut distances = vec![0; MASK_SIDE * MASK_SIDE];
     for column in 0..MASK_SIDE {
@@ -63,12 +64,12 @@ fn column_distances(is_inside: impl Fn(usize) -> bool) -> Vec<i64> {
     distances
 }
 
-/// Per texel of a row the squared distance to the nearest hole, from the distances within the columns: the lower envelope
-/// of one parabola per column, with a hole beyond each end.
+/// For each texel of a row, the squared distance to the nearest hole, given the distances within the columns. It is the
+/// lower envelope of one parabola per column, with a hole beyond each end.
 fn row_distances(columns: &[i64]) -> Vec<i64> {
     let height = |column: i64| if (0..SIDE).contains(&column) { columns[column as usize] } else { 0 };
     let at = |x: i64, column: i64| (x - column) * (x - column) + height(column) * height(column);
-    // Parabolas of the envelope, each with the first place where it is the lowest.
+    // The parabolas of the envelope, each with the first place where it is the lowest.
     let mut envelope: Vec<(i64, i64)> = vec![(-1, -1)];
     for column in 0..=SIDE {
         while envelope.last().is_some_and(|&(lowest, first)| at(first, lowest) > at(first, column)) {

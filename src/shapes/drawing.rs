@@ -1,7 +1,7 @@
-//! Drawing templates with integers: every texel is the mean of 8x8 samples, so edges are smooth and every machine draws
-//! the same.
+//! Drawing templates with integers: every texel is the mean of 8x8 samples, so edges are smooth and the drawing is the
+//! same on every machine.
 
-use super::template::Ink;
+use super::ink::Ink;
 use crate::model::mask::MASK_SIDE;
 
 /// Units of a drawing's coordinates per texel.
@@ -11,10 +11,10 @@ pub(super) const HALF: i64 = MASK_SIDE as i64 / 2 * UNITS_PER_TEXEL;
 /// Samples along each side of a texel.
 const SAMPLES: i64 = 8;
 
-/// The drawing whose intensity at (x, y), x to the right and y down from the middle, is `intensity_at`, or which has a
-/// hole there where that is `None`.
+/// The drawing whose intensity at (x, y) is `intensity_at`, or a hole where that is `None`. x goes to the right and y
+/// down from the middle.
 ///
-/// Samples lie at odd coordinates, so none lies on an axis and a symmetric rule gives a symmetric drawing.
+/// Samples lie at odd coordinates, so no sample lies on an axis, and a symmetric rule gives a symmetric drawing.
 pub(super) fn drawn(intensity_at: impl Fn(i64, i64) -> Option<i64>) -> Vec<Ink> {
     let side = MASK_SIDE as i64;
     let texel = |index: i64| {
@@ -33,12 +33,13 @@ pub(super) fn drawn(intensity_at: impl Fn(i64, i64) -> Option<i64>) -> Vec<Ink> 
     (0..side * side).map(texel).collect()
 }
 
-/// The straight line through (`from`, `low`) and (`to`, `high`) at `value`, level outside; `from < to`.
+/// The value at `value` of the straight line from (`from`, `low`) to (`to`, `high`), constant beyond its ends; `from <
+/// to`.
 pub(super) fn ramp(value: i64, (from, to): (i64, i64), (low, high): (i64, i64)) -> i64 {
     low + rounded((value.clamp(from, to) - from) * (high - low), to - from)
 }
 
-/// As [`ramp`] from 0 to 255, but with level ends: `3 t^2 - 2 t^3`.
+/// As [`ramp`] from 0 to 255, but it begins and ends with slope 0: `3 t^2 - 2 t^3`.
 pub(super) fn smooth_step(value: i64, from: i64, to: i64) -> i64 {
     let t = ramp(value, (from, to), (0, 4096));
     rounded(255 * t * t * (3 * 4096 - 2 * t), 1 << 36)

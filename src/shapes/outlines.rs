@@ -1,11 +1,11 @@
-//! The built-in templates that are drawn by an outline.
+//! The built-in templates that are defined by an outline.
 
 use super::drawing::{HALF, UNITS_PER_TEXEL, drawn, ramp, rounded};
-use super::template::Ink;
+use super::ink::Ink;
 
-/// The directions of the petals that reach into the quarter to the upper right, 60 degrees apart.
+/// The directions, 60 degrees apart, of the petals that reach into the upper right quarter.
 const PETALS: [(i64, i64); 2] = [(0, -1024), (887, -512)];
-/// Length of the directions of [`PETALS`].
+/// Length of each direction of [`PETALS`].
 const ONE: i64 = 1024;
 
 /// All of the square, evenly bright.
@@ -13,7 +13,7 @@ pub(super) fn square() -> Vec<Ink> {
     drawn(|_, _| Some(255))
 }
 
-/// The square with a dark ring along its edge: a sixteenth of a side is what still shows on a tile of 12 px.
+/// The square with a dark ring along its edge: a sixteenth of a side still shows on a tile of 12 px.
 pub(super) fn border() -> Vec<Ink> {
     drawn(|x, y| {
         let from_edge = HALF - x.abs().max(y.abs());
@@ -21,8 +21,8 @@ pub(super) fn border() -> Vec<Ink> {
     })
 }
 
-/// Four cords along x with round ends, brighter along their middle. The gaps are more than an eighth of a side, so that
-/// tiles of 8 px have them.
+/// Four cords along x with round ends, brighter along their middle. The gaps are wider than an eighth of a side, so
+/// they show on tiles of 8 px.
 pub(super) fn lines() -> Vec<Ink> {
     let (pitch, radius) = (73 * UNITS_PER_TEXEL, 37 * UNITS_PER_TEXEL / 2);
     drawn(move |x, y| {
@@ -44,7 +44,7 @@ pub(super) fn flower() -> Vec<Ink> {
     })
 }
 
-/// The intensity of the petal that points along `direction`, an ellipse, where it is.
+/// The intensity of the petal along `(dx, dy)`, an ellipse; `None` outside it.
 fn petal(x: i64, y: i64, (dx, dy): (i64, i64)) -> Option<i64> {
     const CENTRE: i64 = 1210;
     const LENGTH: i64 = 832;
@@ -52,7 +52,7 @@ fn petal(x: i64, y: i64, (dx, dy): (i64, i64)) -> Option<i64> {
     let along = (x * dx + y * dy) / ONE;
     let across = ((y * dx - x * dy) / ONE).abs();
     let off = along - CENTRE;
-    // 0 in the middle of the petal, 4096 on its edge.
+    // `level` is 0 in the middle of the petal and 4096 on its edge.
     let level = 4096 * off * off / (LENGTH * LENGTH) + 4096 * across * across / (WIDTH * WIDTH);
     let depth = ramp(along, (600, 1500), (150, 255));
     let fold = ramp(across, (20, 90), (60, 0)) * ramp(along, (1100, 1800), (255, 0)) / 255;

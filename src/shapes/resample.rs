@@ -1,15 +1,16 @@
-//! Bringing a drawing of any size to the size of a mask, with integers.
+//! Resizes a drawing of any size to the size of a mask, with integers.
 
-use super::template::Ink;
+use super::ink::Ink;
 use crate::model::mask::MASK_SIDE;
 
-/// Steps into which the values between the two passes are divided.
+/// Fractional steps of the values between the two passes.
 const FRACTION: u64 = 16;
 
 /// The drawing of `width_px` x `height_px` stretched to [`MASK_SIDE`] x [`MASK_SIDE`] texels.
 ///
-/// A triangle filter as wide as a texel or a pixel, whichever is larger: it averages what is reduced and interpolates what
-/// is enlarged. Intensity is weighted by alpha, so holes do not show in the colour of their neighbours.
+/// The filter is a triangle as wide as a texel or a pixel, whichever is larger: it averages when it reduces and
+/// interpolates when it enlarges. Intensity is weighted by alpha, so holes do not affect the colour of their
+/// neighbours.
 pub(super) fn stretched(ink: &[Ink], width_px: u32, height_px: u32) -> Vec<Ink> {
     let columns = weights(width_px as usize);
     let mut narrow = Vec::with_capacity(MASK_SIDE * height_px as usize);
@@ -40,17 +41,18 @@ pub(super) fn stretched(ink: &[Ink], width_px: u32, height_px: u32) -> Vec<Ink> 
     texels
 }
 
-/// The pixels that make one texel along one axis.
+/// The pixels that contribute to one texel along one axis.
 struct Taps {
     first: usize,
     weights: Vec<u64>,
     sum: u64,
 }
 
-/// Per texel along an axis of `side_px` pixels its pixels, with weights that fall linearly with the distance of centres.
+/// For each texel along an axis of `side_px` pixels, its pixels, with weights that fall linearly with the distance of
+/// centres.
 fn weights(side_px: usize) -> Vec<Taps> {
     let (side, texels) = (side_px as i64, MASK_SIDE as i64);
-    // Distances are in 1 / (2 * texels) px: pixel i lies at (2 i + 1) * texels, texel k at (2 k + 1) * side.
+    // Coordinates are in 1 / (2 * texels) px: pixel i lies at (2 i + 1) * texels, texel k at (2 k + 1) * side.
     let support = 2 * side.max(texels);
     let taps = |texel: i64| {
         let centre = (2 * texel + 1) * side;

@@ -1,17 +1,18 @@
-//! Shaders: what makes a mask of a template. One template gives different looks (paper, Figs 8a and 8b).
+//! Shaders turn templates into masks. One template can have several looks (paper, Figs 8a and 8b).
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::depth::{DEPTH_PER_TEXEL, Depth};
 use super::drawing::{ramp, rounded, smooth_step};
+use super::ink::Ink;
 use super::noise::{ONE, noise};
-use super::template::{Ink, Template};
+use super::template::Template;
 use crate::error::{Error, Result};
 use crate::model::Mask;
 use crate::model::mask::{MASK_SIDE, Texel};
 
-/// A way to make a mask of a template.
+/// A way to turn a template into a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Shader {
     /// Coverage from alpha, evenly bright.
@@ -49,7 +50,7 @@ impl Shader {
         Self::Wash,
     ];
 
-    /// The name, as it is typed.
+    /// The name that users type.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -65,7 +66,7 @@ impl Shader {
         }
     }
 
-    /// Whether it is made for translucent tiles: its coverage is mostly neither 0 nor 255.
+    /// Whether it is meant for translucent tiles: its coverage is mostly neither 0 nor 255.
     #[must_use]
     pub fn is_translucent(self) -> bool {
         matches!(self, Self::Soft | Self::Fade | Self::Wash)
@@ -89,10 +90,10 @@ impl Shader {
         }
     }
 
-    /// The mask that this shader makes of a template. Integers only, so it is the same on every machine.
+    /// The mask that this shader makes of a template. It is computed with integers, so it is the same on every machine.
     ///
-    /// The distances that shaders speak of are for the full square; where a drawing has no room for them, as between the
-    /// edges of a stripe, they shrink with its greatest depth.
+    /// The distances that shaders use are meant for the full square. In a drawing without room for them, such as a
+    /// narrow stripe, they shrink with its greatest depth.
     #[must_use]
     pub fn mask(self, template: &Template) -> Mask {
         let ink = template.ink();
@@ -132,22 +133,22 @@ fn each(ink: &[Ink], texel: impl Fn(&Ink) -> Texel) -> Vec<Texel> {
     ink.iter().map(texel).collect()
 }
 
-/// As [`each`], of a texel's ink and its depth.
+/// As [`each`], but the texel also depends on its depth.
 fn each_with_depth(ink: &[Ink], depth: &Depth, texel: impl Fn(&Ink, i64) -> Texel) -> Vec<Texel> {
     ink.iter().zip(depth.texels()).map(|(ink, &depth)| texel(ink, depth)).collect()
 }
 
-/// A part of an alpha: `opacity` of 255, rounded.
+/// An alpha times `opacity` / 255, rounded.
 fn thinned(alpha: u8, opacity: i64) -> u8 {
     rounded(i64::from(alpha) * opacity, 255) as u8
 }
 
-/// `texels` as a depth, or less where the drawing is nowhere three times as deep.
+/// `texels` as a depth, or a third of the drawing's greatest depth if that is less.
 fn width(texels: i64, depth: &Depth) -> i64 {
     (texels * DEPTH_PER_TEXEL).min(depth.greatest() / 3).max(1)
 }
 
-/// What is darkest becomes full, and what is brightest keeps enough light for evolution to make up for it.
+/// The darkest parts become fully bright. The brightest parts keep enough light for evolution to make up for it.
 fn negative(ink: &[Ink]) -> Vec<Texel> {
     const DARKEST: i64 = 120;
     let drawn = || ink.iter().filter(|ink| ink.alpha > 0).map(|ink| i64::from(ink.intensity));
@@ -168,7 +169,7 @@ fn outline(ink: &[Ink]) -> Vec<Texel> {
     })
 }
 
-/// Blurred, since the depth of a square has creases along its diagonals.
+/// The depth is blurred, since that of a square has creases along its diagonals.
 fn soft(ink: &[Ink]) -> Vec<Texel> {
     let depth = Depth::of(ink);
     let greatest = depth.greatest();
@@ -211,7 +212,7 @@ fn wash(ink: &[Ink]) -> Vec<Texel> {
     (0..).zip(ink.iter().zip(depth.texels())).map(texel).collect()
 }
 
-/// A bevel along the edge. Light comes from the upper left, so a slope that rises to the right or downwards is lit.
+/// A bevel along the edge. Light comes from the upper left, so slopes that rise to the right or downwards are lit.
 fn emboss(ink: &[Ink]) -> Vec<Texel> {
     const LEVEL: i64 = 222;
     let depth = Depth::of(ink);
@@ -231,7 +232,7 @@ fn emboss(ink: &[Ink]) -> Vec<Texel> {
     (0..).zip(ink).map(|(index, ink)| Texel { coverage: ink.alpha, shade: shade(index) }).collect()
 }
 
-/// The mean of the heights within `reach` texels along both axes, with 0 outside.
+/// The mean of the heights within `reach` texels along both axes; outside, heights are 0.
 fn blurred(heights: &[i64], reach: i64) -> Vec<i64> {
     let along_rows = blurred_in_lines(heights, reach, 1);
     blurred_in_lines(&along_rows, reach, MASK_SIDE)

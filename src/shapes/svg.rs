@@ -1,33 +1,33 @@
 //! Masks from SVG, rasterised by resvg.
 //!
-//! Its arithmetic is single-precision floats, so another kind of processor may round an edge's alpha differently: what
-//! decides a result is the texels of a mask, not the file that they come from.
+//! It computes with single-precision floats, so another kind of processor may round an edge's alpha differently.
+//! Therefore the texels of a mask decide a result, not the file that they come from.
 
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{ImageHrefResolver, Options, Tree, roxmltree};
 
-use super::template::Ink;
+use super::ink::Ink;
 use crate::model::mask::MASK_SIDE;
 
-/// Bytes at a file's beginning in which the root element is looked for.
+/// The root element is searched for in this many bytes at the beginning of a file.
 const HEAD_BYTES: usize = 4096;
 
-/// Whether these bytes are an SVG: text with the root element `svg`, as far as the beginning shows.
+/// Whether these bytes begin like an SVG: text with the root element `svg`.
 pub(super) fn is_svg(bytes: &[u8]) -> bool {
     let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD_BYTES)]);
     let head = head.trim_start_matches('\u{feff}').trim_start();
     head.starts_with('<') && (head.contains("<svg") || head.contains(":svg"))
 }
 
-/// The drawing in an SVG, all of it, in the middle of the square with its aspect kept; or why there is none.
+/// The whole drawing of an SVG, centred in the square with its aspect kept; or the reason why there is none.
 pub(super) fn rasterised(bytes: &[u8]) -> Result<Vec<Ink>, String> {
-    let unparsable = |detail: String| format!("the SVG does not parse ({detail}); correct it or export it anew");
+    let unparsable = |detail: String| format!("the SVG does not parse ({detail}); correct it or export it again");
     let text = std::str::from_utf8(bytes).map_err(|error| unparsable(error.to_string()))?;
     let parsing = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
     let document =
         roxmltree::Document::parse_with_options(text, parsing).map_err(|error| unparsable(error.to_string()))?;
     refuse_what_is_not_drawn(&document)?;
-    // What a picture would name could be any file of this machine.
+    // An image element could name any file of this machine.
     let no_pictures =
         ImageHrefResolver { resolve_data: Box::new(|_, _, _| None), resolve_string: Box::new(|_, _| None) };
     let options = Options { image_href_resolver: no_pictures, ..Options::default() };
@@ -55,8 +55,8 @@ pub(super) fn rasterised(bytes: &[u8]) -> Result<Vec<Ink>, String> {
         .collect())
 }
 
-/// Refuses elements without which the drawing would not be what its author sees: there are no fonts here, and no
-/// pictures in pictures.
+/// Refuses elements that would be left out, so that the drawing would not look as its author sees it: there are no
+/// fonts here, and embedded pictures are not drawn.
 fn refuse_what_is_not_drawn(document: &roxmltree::Document<'_>) -> Result<(), String> {
     for element in document.descendants().filter(roxmltree::Node::is_element) {
         match element.tag_name().name() {
@@ -66,7 +66,7 @@ fn refuse_what_is_not_drawn(document: &roxmltree::Document<'_>) -> Result<(), St
                     .to_owned());
             }
             name @ ("image" | "foreignObject") => {
-                return Err(format!("the SVG has an element `{name}`, which is not drawn; replace it by paths"));
+                return Err(format!("the SVG has an element `{name}`, which is not drawn; replace it with paths"));
             }
             _ => {}
         }

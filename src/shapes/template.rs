@@ -1,22 +1,11 @@
-//! A template: the raw drawing of a tile shape, before a shader makes a mask of it.
+//! A template: the raw drawing of a tile shape, before a shader turns it into a mask.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::built_in::BuiltIn;
-use super::read::read;
-use crate::error::{Error, Result};
+use super::ink::Ink;
 use crate::model::mask::MASK_SIDE;
-
-/// One texel of a drawing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Ink {
-    /// How much of the texel is drawn on: 0 is a hole, 255 is full.
-    pub alpha: u8,
-    /// How bright the drawing is there, of 255; means nothing where alpha is 0.
-    pub intensity: u8,
-}
 
 /// Where a template comes from, for messages and metadata.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,6 +14,8 @@ pub enum Source {
     BuiltIn(BuiltIn),
     /// It was read from this file.
     File(PathBuf),
+    /// It never was a file.
+    Memory,
 }
 
 impl fmt::Display for Source {
@@ -32,6 +23,7 @@ impl fmt::Display for Source {
         match self {
             Self::BuiltIn(shape) => formatter.write_str(shape.name()),
             Self::File(path) => path.display().fmt(formatter),
+            Self::Memory => formatter.write_str("a mask in memory"),
         }
     }
 }
@@ -44,30 +36,10 @@ pub struct Template {
 }
 
 impl Template {
-    /// The template of `ink`, which has [`MASK_SIDE`]² texels, row by row.
+    /// The template of `ink`: [`MASK_SIDE`]² texels, row by row.
     pub(super) fn new(source: Source, ink: Vec<Ink>) -> Self {
         assert_eq!(ink.len(), MASK_SIDE * MASK_SIDE, "a template has one ink per texel");
         Self { source, ink }
-    }
-
-    /// The template that `name_or_path` means: a built-in one if it is the name of one, else the file at that path. A file
-    /// of a built-in's name is reached as `./NAME`.
-    ///
-    /// # Errors
-    /// [`Error::Input`] as [`read`]; for a file that is not there the message lists the built-in names.
-    pub fn find(name_or_path: &Path) -> Result<Self> {
-        let shape = BuiltIn::ALL.into_iter().find(|shape| Path::new(shape.name()) == name_or_path);
-        if let Some(shape) = shape {
-            return Ok(shape.template());
-        }
-        if !name_or_path.exists() {
-            let names = BuiltIn::ALL.map(BuiltIn::name).join(", ");
-            return Err(Error::input(
-                name_or_path,
-                format!("there is no such mask; name one of {names}, or a picture or SVG file"),
-            ));
-        }
-        read(name_or_path)
     }
 
     /// Where the template comes from.
@@ -80,5 +52,13 @@ impl Template {
     #[must_use]
     pub fn ink(&self) -> &[Ink] {
         &self.ink
+    }
+}
+
+impl BuiltIn {
+    /// The template; it always has the same texels.
+    #[must_use]
+    pub fn template(self) -> Template {
+        Template::new(Source::BuiltIn(self), self.drawing())
     }
 }

@@ -8,22 +8,22 @@ use crate::error::{Error, Result};
 use crate::model::mask::{COVERAGE_THRESHOLD, Texel};
 use crate::model::{Blend, Mask, MaskSet};
 
-/// A template in a shader.
+/// A template drawn by a shader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outfit {
     /// What is drawn.
     pub template: Template,
-    /// How.
+    /// How it is drawn.
     pub shader: Shader,
 }
 
-/// A set of masks, and which of its layers each outfit became.
+/// A set of masks, and the layer of each outfit in it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Wardrobe {
-    /// The masks, with the full square as layer 0, worn or not.
+    /// The masks. Layer 0 is the full square, whether any fly wears it or not.
     pub masks: MaskSet,
-    /// Per outfit, in the order asked for, its layer: the `mask` of flies that wear it. Outfits with the same texels share
-    /// a layer, and those that are the full square have layer 0.
+    /// The layer of each outfit, in the order asked for: the `mask` of the flies that wear it. Outfits with the same
+    /// texels share a layer, and a full square has layer 0.
     pub layers: Vec<u16>,
 }
 
@@ -31,7 +31,7 @@ impl Wardrobe {
     /// The masks of `outfits`.
     ///
     /// With [`Blend::Translucent`], `opacity` scales every coverage `c` to `(c * opacity + 127) / 255`; with
-    /// [`Blend::Opaque`] it means nothing.
+    /// [`Blend::Opaque`] it has no effect.
     ///
     /// # Errors
     /// If an outfit would cover nothing: [`Error::Input`] naming the file, or [`Error::Parameter`] for a built-in
@@ -84,6 +84,6 @@ fn covers_nothing(outfit: &Outfit) -> Error {
     );
     match outfit.template.source() {
         Source::File(path) => Error::input(path, reason),
-        Source::BuiltIn(shape) => Error::parameter("mask", format!("`{shape}`: {reason}")),
+        source @ (Source::BuiltIn(_) | Source::Memory) => Error::parameter("mask", format!("`{source}`: {reason}")),
     }
 }

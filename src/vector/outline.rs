@@ -8,12 +8,12 @@ use crate::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE};
 const SIDE: i32 = MASK_SIDE as i32;
 /// Steps to the right, down, left and up.
 const STEPS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
-/// From a corner, the texel ahead to the right and the one ahead to the left of each step.
+/// For each step from a corner, the texel ahead on the right and the one ahead on the left.
 const AHEAD: [[(i32, i32); 2]; 4] = [[(0, 0), (0, -1)], [(-1, 0), (0, 0)], [(-1, -1), (-1, 0)], [(0, -1), (-1, -1)]];
 
-/// The solid texels of `mask` as SVG path data, to be filled by either rule; empty if there are none.
+/// The solid texels of `mask` as SVG path data, for either fill rule; empty if there are none.
 ///
-/// A texel is one unit and the mask's centre the origin. Each polygon has its solid texels on its right, and corners only
+/// A texel is one unit and the mask's centre the origin. Each polygon has solid texels on its right, and a corner only
 /// where it turns.
 pub(super) fn outline(mask: &Mask) -> String {
     let is_solid = |column: i32, row: i32| {
@@ -23,7 +23,7 @@ pub(super) fn outline(mask: &Mask) -> String {
     let is_top = |x: i32, y: i32| is_solid(x, y) && !is_solid(x, y - 1);
     let mut seen = vec![false; MASK_SIDE * MASK_SIDE];
     let mut path = String::new();
-    // Every polygon has an upper side, and is met at the leftmost texel of its highest one.
+    // Every polygon has upper sides, so this scan finds it at the leftmost texel of the highest one.
     for (y, x) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (y, x))) {
         if is_top(x, y) && !seen[(y * SIDE + x) as usize] {
             push_polygon(&mut path, (x, y), &is_solid, &mut seen);

@@ -1,8 +1,8 @@
-//! Masks as SVG definitions: `#m1`, `#m2`, .. for every layer that is worn, filled by who uses it. With grout there are
-//! `#o1`, `#o2`, .. beside them: the outlines without shade.
+//! Masks as SVG definitions: `#m1`, `#m2`, .. for the layers that flies wear. The element that uses a definition sets
+//! its fill. With grout there are also `#o1`, `#o2`, ..: the outlines without shade.
 //!
-//! An opaque mask is the outline of its solid texels, a translucent one a picture whose alpha is the coverage. Shade is
-//! black over the colour: c * shade / 255 is c under black of opacity 255 - shade.
+//! An opaque mask is the outline of its solid texels, and a translucent one is a picture whose alpha is the coverage.
+//! Shade is drawn as black over the colour: c * shade / 255 is c under black with the opacity 255 - shade.
 
 use super::outline::outline;
 use super::{base64, push};
@@ -34,7 +34,7 @@ impl Shapes {
         Ok(Self { definitions })
     }
 
-    /// The `<defs>` element; empty if nobody wears a mask.
+    /// The `<defs>` element; empty if no fly wears a mask.
     pub(super) fn definitions(&self) -> &str {
         &self.definitions
     }
@@ -71,7 +71,7 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, population: &Pop
             push_cut_out(svg, layer, &format!("<path clip-rule=\"evenodd\" d=\"{outline}\"/>"), &shade);
         }
         Blend::Translucent => {
-            // White with alpha: luminance and alpha agree in whatever colour space they are taken.
+            // White with alpha: whichever colour space a program takes the luminance in, it agrees with alpha.
             let white: Vec<[u8; 4]> = mask.texels().iter().map(|texel| [255, 255, 255, texel.coverage]).collect();
             let coverage = picture(&white)?;
             push(
@@ -98,7 +98,7 @@ fn push_cut_out(svg: &mut String, layer: usize, shape: &str, shade: &str) {
     );
 }
 
-/// A picture of texels with hard edges: `pixelated` is the word of browsers, the attribute that of SVG 1.1.
+/// A picture of texels with hard edges: browsers follow `pixelated`, and programs for SVG 1.1 follow the attribute.
 fn picture(texels: &[[u8; 4]]) -> Result<String> {
     let png = photo::encode_png_with_alpha(MASK_SIDE as u32, MASK_SIDE as u32, texels, &Metadata::new())?;
     Ok(format!(

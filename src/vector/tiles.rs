@@ -5,9 +5,10 @@ use crate::model::tables::TURN_STEPS;
 use crate::model::target::hexadecimal;
 use crate::model::{Fly, Grout};
 
-/// The tile of one fly: a rectangle turned about its centre, or a mask that is stretched, turned and moved to its place.
+/// Appends the tile of one fly: a rectangle turned about its centre, or a mask that is stretched, turned and moved into
+/// place.
 ///
-/// `number` is that of no other fly of the document.
+/// `number` must be unique within the document.
 pub(super) fn push_fly(svg: &mut String, number: usize, fly: &Fly, grout: Option<Grout>) {
     if fly.mask > 0 {
         push_mask(svg, number, fly, grout);
@@ -23,12 +24,12 @@ pub(super) fn push_fly(svg: &mut String, number: usize, fly: &Fly, grout: Option
     }
 }
 
-/// Whether a ring of `width` leaves something of the tile.
+/// Whether a ring of `width` leaves any of the tile's inside.
 fn has_inside(fly: &Fly, width: u32) -> bool {
     fly.w.min(fly.h) > 2 * width
 }
 
-/// The square of a fly without what lies within `ring` genes of its edges.
+/// The rectangle of a fly, made smaller by `ring` units of a gene at each edge.
 fn push_rectangle(svg: &mut String, fly: &Fly, ring: u32, color: &str) {
     let ring = 2 * i64::from(ring);
     let (x, y) = (2 * i64::from(fly.x), 2 * i64::from(fly.y));
@@ -42,11 +43,11 @@ fn push_rectangle(svg: &mut String, fly: &Fly, ring: u32, color: &str) {
     push(svg, format_args!(" fill=\"{color}\"/>\n"));
 }
 
-/// The mask of a fly; with grout its outline (`#o1`, `#o2`, ..), and over that the mask, cut to what the ring leaves.
+/// The mask of a fly. With grout, it is the outline (`#o1`, `#o2`, ..) under the part of the mask inside the ring.
 fn push_mask(svg: &mut String, number: usize, fly: &Fly, grout: Option<Grout>) {
     let degrees = degrees(fly);
     let rotate = if degrees == "0" { String::new() } else { format!("rotate({degrees})") };
-    // A side of w genes is 2w units, over the 256 units of a mask.
+    // A gene of w makes a side of 2w user units, and a mask has 256 units.
     let [across, along] = [fly.w, fly.h].map(|side| f64::from(side) / 128.0);
     let transform = format!("translate({} {}){rotate}scale({across} {along})", 2 * fly.x, 2 * fly.y);
     let (mask, color) = (fly.mask, hexadecimal(fly.color()));
@@ -72,14 +73,14 @@ fn push_mask(svg: &mut String, number: usize, fly: &Fly, grout: Option<Grout>) {
     );
 }
 
-/// The angle of a fly as the engine knows it: one of 4,096 directions.
+/// The angle of a fly in degrees, rounded down to one of 4,096 directions as in the engine.
 fn degrees(fly: &Fly) -> String {
     let direction = (usize::from(fly.angle) * TURN_STEPS) >> 16;
     four_decimals(direction as f64 * 360.0 / TURN_STEPS as f64)
 }
 
-/// An angle in degrees or a place in a mask, off by at most 0.00005: a corner of the largest tile moves by less than a
-/// gene's unit.
+/// An angle in degrees or a coordinate in a mask, rounded by at most 0.00005: a corner of the largest tile moves by
+/// less than a gene's unit.
 fn four_decimals(degrees: f64) -> String {
     let text = format!("{degrees:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -1,4 +1,4 @@
-//! Buffers: a named range of bytes on the device, or on the host for the transfer to and from it.
+//! Buffers: named ranges of bytes in the device's memory, or in the host's for transfers to and from the device.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::memory::{Memory, Purpose};
 use super::{Device, Staging, call_failed, refused};
 use crate::error::{Error, Remedy, Result};
 
-/// What shaders may do with a buffer; copies to and from it are always possible.
+/// What a buffer is for, apart from copies to and from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BufferUse {
     /// Shaders read and write it as a storage buffer.
@@ -22,8 +22,8 @@ pub enum BufferUse {
 /// Where a buffer lives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Residence {
-    /// In the memory that is fastest for the device. Written by [`super::Recorder::write_buffer`] and read by
-    /// [`super::Recorder::read_buffer`].
+    /// In the memory that is fastest for the device. [`super::Recorder::write_buffer`] writes it and
+    /// [`super::Recorder::read_buffer`] reads it.
     Device,
     /// In host memory, mapped: the CPU writes, the device reads.
     Upload,
@@ -59,7 +59,7 @@ impl Buffer {
         if usage == BufferUse::Storage {
             flags |= vk::BufferUsageFlags::STORAGE_BUFFER;
         }
-        // Vulkan knows no empty buffer, but a list without entries is a normal thing to have.
+        // Vulkan has no empty buffers, but a list without entries is normal.
         let info = vk::BufferCreateInfo::default().size(size_bytes.max(4)).usage(flags);
         // SAFETY: V1.
         let handle = unsafe { device.raw().create_buffer(&info, None) }
@@ -93,13 +93,13 @@ impl Buffer {
         self.size_bytes
     }
 
-    /// Whether [`Self::write`] and [`Self::read`] reach the bytes without a copy on the device.
+    /// Whether the CPU can access the bytes directly, by [`Self::write`] and [`Self::read`].
     #[must_use]
     pub fn has_host_access(&self) -> bool {
         self.host_access
     }
 
-    /// Writes `bytes` at `offset`, at once. Nothing that uses the buffer may be running on the device.
+    /// Writes `bytes` at `offset` immediately. Nothing that uses the buffer may be running on the device.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the range is outside the buffer or the CPU cannot reach it.
@@ -116,7 +116,7 @@ impl Buffer {
         self.look(offset, bytes.len() as u64, |read| bytes.copy_from_slice(read))
     }
 
-    /// Looks at bytes where they lie; else as [`Self::read`].
+    /// Calls `look` with the bytes where they lie; otherwise as [`Self::read`].
     pub(super) fn look<T>(&self, offset: u64, size_bytes: u64, look: impl FnOnce(&[u8]) -> T) -> Result<T> {
         self.check_range("read of", offset, size_bytes)?;
         let range = self.host_offset(offset).zip(usize::try_from(size_bytes).ok());
@@ -127,7 +127,7 @@ impl Buffer {
         self.handle.get()
     }
 
-    /// An error that names `verb` unless `size` bytes at `offset` lie inside the buffer.
+    /// Returns an error that names `verb`, unless `size` bytes at `offset` lie inside the buffer.
     pub(super) fn check_range(&self, verb: &str, offset: u64, size: u64) -> Result<()> {
         if offset.checked_add(size).is_some_and(|end| end <= self.size_bytes) {
             return Ok(());

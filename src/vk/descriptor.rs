@@ -1,33 +1,15 @@
-//! What is bound to a pipeline: one descriptor set of storage buffers and sampled images, written once.
+//! What is bound to a pipeline: one descriptor set of storage buffers and sampled images, which is written once.
 
 use std::sync::Arc;
 
 use ash::vk;
 
 use super::handle::Owned;
-use super::pipeline::STAGES;
-use super::{Buffer, Device, Image, PipelineLayout, call_failed, refused};
+use super::pipeline_layout::{BindingKind, PipelineLayout};
+use super::{Buffer, Device, Image, call_failed, refused};
 use crate::error::Result;
 
-/// The kind of thing that a shader expects at a binding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BindingKind {
-    /// A storage buffer.
-    StorageBuffer,
-    /// An image without a sampler, read by `texelFetch`.
-    SampledImage,
-}
-
-impl BindingKind {
-    fn raw(self) -> vk::DescriptorType {
-        match self {
-            Self::StorageBuffer => vk::DescriptorType::STORAGE_BUFFER,
-            Self::SampledImage => vk::DescriptorType::SAMPLED_IMAGE,
-        }
-    }
-}
-
-/// A thing to bind.
+/// What to bind at one binding.
 #[derive(Clone, Copy)]
 pub enum Binding<'a> {
     /// A whole storage buffer.
@@ -45,7 +27,7 @@ impl Binding<'_> {
     }
 }
 
-/// The things bound to a pipeline. It fits every pipeline that expects the same kinds in the same order.
+/// What is bound to a pipeline. A group fits every pipeline that expects the same kinds in the same order.
 pub struct BindingGroup {
     // The pool owns the set.
     _pool: Owned<vk::DescriptorPool>,
@@ -120,31 +102,8 @@ fn image_of(binding: &Binding<'_>) -> Option<Arc<Image>> {
     }
 }
 
-/// The layout of a set with these bindings, visible to all stages.
-pub(super) fn create_set_layout(
-    device: &Arc<Device>,
-    name: &str,
-    kinds: &[BindingKind],
-) -> Result<Owned<vk::DescriptorSetLayout>> {
-    let bindings: Vec<vk::DescriptorSetLayoutBinding<'_>> = (0..)
-        .zip(kinds)
-        .map(|(binding, kind)| {
-            vk::DescriptorSetLayoutBinding::default()
-                .binding(binding)
-                .descriptor_type(kind.raw())
-                .descriptor_count(1)
-                .stage_flags(STAGES)
-        })
-        .collect();
-    let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-    // SAFETY: V1.
-    let layout = unsafe { device.raw().create_descriptor_set_layout(&info, None) }
-        .map_err(|result| call_failed(format!("creation of the set layout of pipeline {name}"), result))?;
-    Ok(Owned::new(device, layout, name))
-}
-
 fn create_pool(device: &Arc<Device>, name: &str, kinds: &[BindingKind]) -> Result<Owned<vk::DescriptorPool>> {
-    // A pool without descriptors is invalid, so an empty group pays for one that it does not use.
+    // A pool without descriptors is invalid, so an empty group has one that it does not use.
     let sizes: Vec<vk::DescriptorPoolSize> = if kinds.is_empty() { &[BindingKind::StorageBuffer] } else { kinds }
         .iter()
         .map(|kind| vk::DescriptorPoolSize::default().ty(kind.raw()).descriptor_count(1))

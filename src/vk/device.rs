@@ -20,10 +20,10 @@ const MIB: u64 = 1 << 20;
 /// How bytes reach buffers on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Staging {
-    /// Directly where the CPU and the device share fast memory, else through a staging buffer.
+    /// Directly if the CPU and the device share fast memory, otherwise through a staging buffer.
     #[default]
     Auto,
-    /// Always through a staging buffer, so that a test on software Vulkan runs what a discrete GPU runs.
+    /// Always through a staging buffer, so that a test on software Vulkan runs the same code as a discrete GPU.
     Forced,
 }
 
@@ -32,7 +32,8 @@ pub enum Staging {
 pub struct DeviceOptions {
     /// How bytes reach buffers on the device.
     pub staging: Staging,
-    /// What [`Device::pipeline_cache_bytes`] returned earlier, perhaps for another device or driver; empty for none.
+    /// What [`Device::pipeline_cache_bytes`] returned earlier, perhaps for another device or driver; empty if there is
+    /// none.
     pub pipeline_cache: Vec<u8>,
 }
 
@@ -47,7 +48,7 @@ pub struct Device {
     submissions: AtomicU64,
     pub(super) observers: Mutex<Vec<Arc<dyn SubmissionObserver>>>,
     info: DeviceInfo,
-    // After the allocator, which returns its memory to the device.
+    // Dropped after the allocator, which returns its memory to the device.
     raw: RawDevice,
 }
 
@@ -71,13 +72,14 @@ impl Device {
     /// Opens the device that `info` describes.
     ///
     /// # Errors
-    /// [`Error::NoSuitableDevice`] if it lacks something or is no longer there; [`Error::Vulkan`] if the driver refuses.
+    /// [`Error::NoSuitableDevice`] if it lacks something or is no longer there; [`Error::Vulkan`] if the driver
+    /// refuses.
     pub fn create(instance: &Arc<Instance>, info: &DeviceInfo, options: &DeviceOptions) -> Result<Arc<Self>> {
         let physical = find_physical(instance, info)?;
         let (queue_family, _) = physical::queue_family(instance.raw(), physical)
             .ok_or_else(|| lacks(info, vec!["a queue for graphics and compute".to_owned()]))?;
         let clock = clock_extension(instance, physical)?;
-        let functions = create_raw(instance, (physical, info), queue_family, clock)?;
+        let functions = create_raw(instance, physical, info, queue_family, clock)?;
         let debug_utils = instance.has_debug_utils().then(|| debug_utils::Device::new(instance.raw(), &functions));
         let calibrated = clock.map(|name| Calibrated::new(instance.raw(), &functions, name));
         let raw = RawDevice { functions, debug_utils, calibrated, physical, instance: Arc::clone(instance) };
@@ -87,7 +89,7 @@ impl Device {
             physical_device: physical,
             debug_settings: AllocatorDebugSettings::default(),
             buffer_device_address: false,
-            // Small first blocks: many pictures are small, and software Vulkan pays for every page that it maps.
+            // The first blocks are small: many pictures are small, and on software Vulkan every mapped page costs time.
             allocation_sizes: AllocationSizes::new(8 * MIB, 8 * MIB)
                 .with_max_device_memblock_size(256 * MIB)
                 .with_max_host_memblock_size(64 * MIB),
@@ -127,7 +129,7 @@ impl Device {
         self.staging
     }
 
-    /// The compiled pipelines, to be kept for the next start; empty if the driver has none to give.
+    /// The compiled pipelines, which the next start can reuse; empty if the driver returns none.
     #[must_use]
     pub fn pipeline_cache_bytes(&self) -> Vec<u8> {
         // SAFETY: V1.
@@ -138,7 +140,7 @@ impl Device {
         &self.raw.functions
     }
 
-    /// Names and labels for debuggers, where the instance offers them.
+    /// Names and labels for debuggers, if the instance offers them.
     pub(super) fn debug_utils(&self) -> Option<&debug_utils::Device> {
         self.raw.debug_utils.as_ref()
     }
@@ -181,7 +183,7 @@ impl Device {
         self.submissions.fetch_add(1, Ordering::Relaxed) + 1
     }
 
-    /// Gives a handle its debug name. Names serve people only, so a failure is not worth an error.
+    /// Gives a handle its debug name. Names only help people, so a failure is ignored.
     pub(super) fn set_name<T: vk::Handle + Copy>(&self, handle: T, name: &str) {
         if handle.is_null() {
             return;
@@ -193,7 +195,7 @@ impl Device {
         }
     }
 
-    /// Waits until the queue has nothing left to do. A lost device has nothing left either.
+    /// Waits until the queue is idle. A lost device counts as idle.
     pub(super) fn wait_idle(&self) {
         let queue = self.queue();
         // SAFETY: V1, V3.
@@ -227,14 +229,15 @@ fn find_physical(instance: &Instance, info: &DeviceInfo) -> Result<vk::PhysicalD
 
 fn create_raw(
     instance: &Instance,
-    (physical, info): (vk::PhysicalDevice, &DeviceInfo),
+    physical: vk::PhysicalDevice,
+    info: &DeviceInfo,
     queue_family: u32,
     clock: Option<&CStr>,
 ) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
     let mut extensions: Vec<_> = clock.into_iter().map(CStr::as_ptr).collect();
-    // A partial implementation demands that whoever uses it says so.
+    // An implementation that is only partial requires this extension to be enabled.
     if physical::has_extension(instance.raw(), physical, PORTABILITY_SUBSET)? {
         extensions.push(PORTABILITY_SUBSET.as_ptr());
     }
@@ -252,7 +255,8 @@ fn create_raw(
         .map_err(|result| call_failed(format!("vkCreateDevice for {}", info.name), result))
 }
 
-/// A pipeline cache with the bytes of an earlier one if they fit. A device works without one just as well, only slower.
+/// A pipeline cache, filled with the bytes of an earlier one if they fit. Without a cache, a device still works, but
+/// starts more slowly.
 fn create_pipeline_cache(
     device: &ash::Device,
     properties: &vk::PhysicalDeviceProperties,

@@ -1,4 +1,5 @@
-//! One owner for every kind of Vulkan handle: names it when it is wrapped and destroys it when it is dropped.
+//! One owner type for every kind of Vulkan handle: it names the handle when it takes it over, and destroys it when
+//! dropped.
 
 use std::sync::Arc;
 
@@ -6,7 +7,7 @@ use ash::vk;
 
 use super::Device;
 
-/// A handle that one call of the device destroys.
+/// A handle that a single device call destroys.
 pub(super) trait Destroy: vk::Handle + Copy {
     /// # Safety
     /// The handle belongs to `device`, nothing uses it, and it is destroyed only once.

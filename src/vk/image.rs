@@ -1,4 +1,4 @@
-//! Images: what passes draw into, and layered textures that shaders fetch from.
+//! Images: the targets that passes draw into, and layered textures that shaders fetch from.
 //!
 //! An image is moved to the layout `GENERAL` when it is created and stays there.
 
@@ -7,12 +7,13 @@ use std::sync::Arc;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
+use super::commands::run_once;
 use super::handle::Owned;
 use super::memory::{Memory, Purpose};
-use super::{Device, call_failed, refused, submit};
+use super::{Device, call_failed, refused};
 use crate::error::{Error, Remedy, Result};
 
-/// What a pixel of an image holds, and with it what the image is for.
+/// What a pixel of an image holds, which also decides what the image is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageFormat {
     /// Four channels of 8 bits, 0 to 1: a colour attachment.
@@ -94,8 +95,8 @@ impl Image {
     /// Creates an image.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] if a side or the number of layers is past the device's limit,
-    /// [`Error::OutOfDeviceMemory`] if it does not fit.
+    /// [`Error::TooLarge`] if a side or the number of layers exceeds the device's limit, [`Error::OutOfDeviceMemory`]
+    /// if it does not fit.
     pub fn create(device: &Arc<Device>, name: &str, format: ImageFormat, shape: ImageShape) -> Result<Arc<Self>> {
         check_shape(name, shape, device)?;
         let bytes = u64::from(shape.width_px) * u64::from(shape.height_px) * u64::from(shape.layers);
@@ -154,7 +155,7 @@ impl Image {
         self.view.get()
     }
 
-    /// The copy between one layer and tightly packed bytes at `buffer_offset`.
+    /// The description of a copy between one layer and tightly packed bytes at `buffer_offset`.
     pub(super) fn layer_copy(&self, layer: u32, buffer_offset: u64) -> vk::BufferImageCopy {
         vk::BufferImageCopy::default()
             .buffer_offset(buffer_offset)
@@ -172,7 +173,7 @@ fn check_shape(name: &str, shape: ImageShape, device: &Device) -> Result<()> {
     let limits = &device.info().limits;
     let ImageShape { width_px, height_px, layers } = shape;
     if width_px == 0 || height_px == 0 || layers == 0 {
-        return Err(refused(format!("creation of image {name}"), "an image needs a pixel at least"));
+        return Err(refused(format!("creation of image {name}"), "an image needs at least one pixel"));
     }
     if width_px.max(height_px) > limits.image_side_px || layers > limits.image_layers {
         let what = format!(
@@ -202,7 +203,7 @@ fn create_view(
 }
 
 fn move_to_general(device: &Arc<Device>, image: vk::Image, format: ImageFormat) -> Result<()> {
-    submit::run_once(device, "image layout", |commands| {
+    run_once(device, "image layout", |commands| {
         let barriers = [vk::ImageMemoryBarrier2::default()
             .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE)

@@ -1,4 +1,4 @@
-//! The Vulkan instance: loader, layers, and one sentence for each way in which Vulkan can be missing.
+//! The Vulkan instance: loader and layers, and a sentence for each reason why Vulkan may be unavailable.
 
 use std::ffi::CStr;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub enum Validation {
 /// How to create an [`Instance`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct InstanceOptions {
-    /// Whether the validation layer is loaded; it is an error if it is asked for and not installed.
+    /// Whether to load the validation layer. Asking for it is an error if it is not installed.
     pub validation: Validation,
 }
 
@@ -36,7 +36,7 @@ pub struct Instance {
     log: Arc<ValidationLog>,
     raw: ash::Instance,
     has_debug_utils: bool,
-    // Unloads libvulkan, so it goes last.
+    // Dropping it unloads libvulkan, so it comes last.
     entry: ash::Entry,
 }
 
@@ -61,10 +61,10 @@ impl Instance {
         Ok(Arc::new(instance))
     }
 
-    /// Every Vulkan device of this machine, usable or not, in the loader's order.
+    /// All Vulkan devices of this machine, usable or not, in the loader's order.
     ///
     /// # Errors
-    /// [`Error::NoSuitableDevice`] if a driver is installed that finds no hardware.
+    /// [`Error::NoSuitableDevice`] if a driver is installed but finds no hardware.
     pub fn physical_devices(&self) -> Result<Vec<DeviceInfo>> {
         let handles = self.physical_handles()?;
         Ok(handles
@@ -74,7 +74,7 @@ impl Instance {
             .collect())
     }
 
-    /// What the validation layer has said; empty without [`Validation::On`]. The log may outlive the instance.
+    /// The messages of the validation layer; empty without [`Validation::On`]. The log may outlive the instance.
     #[must_use]
     pub fn validation_log(&self) -> &Arc<ValidationLog> {
         &self.log
@@ -114,14 +114,14 @@ impl Drop for Instance {
     }
 }
 
-/// Which optional instance extensions there are.
+/// Which optional instance extensions are available.
 #[derive(Clone, Copy)]
 struct Extensions {
     /// Object names, labels and the messenger.
     debug_utils: bool,
     /// Settings of the validation layer; offered by the layer itself.
     validation_features: bool,
-    /// Lets drivers appear that implement Vulkan only in part, such as those on top of Metal.
+    /// Makes the loader list drivers that implement only a part of Vulkan, such as those on top of Metal.
     portability: bool,
 }
 
@@ -179,7 +179,8 @@ fn create_raw(
     let layer_names = [VALIDATION_LAYER.as_ptr()];
     let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-    // Chained as well as created later: only this one hears the creation and destruction of the instance itself.
+    // This messenger is chained in addition to the one created later, since only this one gets messages about the
+    // creation and destruction of the instance itself.
     let mut messenger = log.messenger_info();
     let mut info =
         vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&extension_names);

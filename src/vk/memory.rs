@@ -1,4 +1,4 @@
-//! Memory behind buffers and images: a piece of the device's allocator that returns itself when dropped.
+//! Memory behind buffers and images: an allocation that returns to the device's allocator when dropped.
 
 use std::sync::{Arc, Mutex};
 
@@ -9,7 +9,7 @@ use gpu_allocator::{AllocationError, MemoryLocation};
 use super::{Device, lock, refused};
 use crate::error::{Error, Result};
 
-/// Memory that the CPU reads as fast as its own; a mapped window onto a discrete GPU's memory lacks the cache.
+/// Memory that the CPU reads as fast as its own. Mapped memory of a discrete GPU is not cached, so it is slower.
 const FAST_FOR_HOST: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::from_raw(
     vk::MemoryPropertyFlags::HOST_VISIBLE.as_raw()
         | vk::MemoryPropertyFlags::HOST_COHERENT.as_raw()
@@ -20,9 +20,9 @@ const FAST_FOR_HOST: vk::MemoryPropertyFlags = vk::MemoryPropertyFlags::from_raw
 pub(super) struct Purpose<'a> {
     /// Debug name of the buffer or image.
     pub(super) name: &'a str,
-    /// Who reads and who writes it.
+    /// Whether the CPU writes it, reads it, or neither.
     pub(super) location: MemoryLocation,
-    /// Whether it holds a buffer; images are laid out by the driver.
+    /// True for a buffer, false for an image, whose layout the driver chooses.
     pub(super) linear: bool,
 }
 
@@ -53,7 +53,7 @@ impl Memory {
                 }
                 other => refused(format!("allocation of memory for {}", purpose.name), other.to_string()),
             })?;
-        // The allocator puts several things into a block.
+        // The block has this name only until another allocation in it gives it its own: several share one block.
         // SAFETY: V1; the handle is only named.
         device.set_name(unsafe { allocation.memory() }, &format!("block with {}", purpose.name));
         Ok(Self { allocation: Mutex::new(allocation), device: Arc::clone(device) })
@@ -76,7 +76,7 @@ impl Memory {
         lock(&self.allocation).memory_properties().contains(FAST_FOR_HOST)
     }
 
-    /// Copies `bytes` into mapped memory; `None` if it is not mapped or too short.
+    /// Copies `bytes` into the memory; `None` if it is not mapped or too short.
     pub(super) fn write(&self, offset: usize, bytes: &[u8]) -> Option<()> {
         let mut allocation = lock(&self.allocation);
         let mapped = allocation.mapped_slice_mut()?;
@@ -84,7 +84,7 @@ impl Memory {
         Some(())
     }
 
-    /// Looks at `size` bytes of mapped memory; `None` if it is not mapped or too short.
+    /// Calls `look` with `size` bytes of the memory; `None` if it is not mapped or too short.
     pub(super) fn look<T>(&self, offset: usize, size: usize, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
         let allocation = lock(&self.allocation);
         let mapped = allocation.mapped_slice()?;
@@ -95,7 +95,8 @@ impl Memory {
 impl Drop for Memory {
     fn drop(&mut self) {
         let allocation = std::mem::take(&mut *lock(&self.allocation));
-        // An allocation that the allocator does not know could only be a bug in it, and there is nobody to tell.
+        // This fails only if the allocator does not know its own allocation. That would be a bug in it, and nobody
+        // could handle it here.
         let _ = lock(self.device.allocator()).free(allocation);
     }
 }

@@ -1,7 +1,7 @@
-//! What the validation layer says: a messenger that collects its errors and warnings into a list.
+//! The messages of the validation layer: a messenger collects its errors and warnings in a list.
 //!
-//! The list is shared, so it can still be read after the device and even the instance are gone: that is when leaked
-//! objects are reported.
+//! The list is shared, so it can be read after the device and even the instance are gone. Only then are leaked objects
+//! reported.
 
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex};
@@ -37,7 +37,7 @@ impl ValidationLog {
             .message_severity(
                 vk::DebugUtilsMessageSeverityFlagsEXT::ERROR | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
             )
-            // Other types carry the loader's remarks on drivers that do not load, which are no fault of ours.
+            // Other types include the loader's remarks about drivers that do not load, which are not our fault.
             .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
             .pfn_user_callback(Some(collect))
             .user_data(Arc::as_ptr(self).cast_mut().cast::<c_void>())
@@ -59,7 +59,7 @@ impl Messenger {
         Ok(Self { functions, handle })
     }
 
-    /// Stops the collecting. The instance must still be alive.
+    /// Stops collecting messages. The instance must still be alive.
     pub(super) fn destroy(&self) {
         // SAFETY: V1; only the instance's `Drop` calls this, once.
         unsafe { self.functions.destroy_debug_utils_messenger(self.handle, None) };

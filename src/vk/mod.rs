@@ -1,21 +1,23 @@
 //! Raw Vulkan, headless: instance, device, memory, pipelines and the recording of work. Knows no fly and no picture.
 //!
-//! Everything that leaves this module is safe to use; `unsafe` stays inside and cites these invariants.
+//! Everything public in this module is safe to use. `unsafe` stays inside and cites these invariants.
 //!
-//! - **V1 alive.** Every wrapper holds its parent ([`Instance`], [`Device`]) by `Arc` and lists its fields in drop order,
-//!   so a parent outlives its children. A pointer handed to Vulkan points to something that lives until the call returns.
-//!   Objects of different devices never meet: a process works with one device at a time.
+//! - **V1 alive.** Every wrapper holds its parent ([`Instance`], [`Device`]) by `Arc` and lists its fields in drop
+//!   order, so a parent outlives its children. A pointer handed to Vulkan points to something that lives until the call
+//!   returns. Objects of different devices never meet: a process works with one device at a time.
 //! - **V2 idle.** Nothing that the device may still use is destroyed: a [`Recorder`] keeps what its commands name until
 //!   their fence has been waited for, and a failed wait is followed by a wait for the idle queue.
 //! - **V3 recording.** `&mut Recorder` is the only way to record; a pass borrows it and ends in `Drop`. The queue is
 //!   behind a lock.
-//! - **V4 layout.** Bytes that cross to a shader are plain data laid out by the caller and checked here for length; SPIR-V
-//!   is the output of a compiler, validated before it is committed.
+//! - **V4 layout.** Bytes that cross to a shader are plain data laid out by the caller and checked here for length;
+//!   SPIR-V is the output of a compiler, validated before it is committed.
 //! - **V5 sync.** One global memory barrier per pass boundary, from the table in `scope`. Images stay in `GENERAL`.
 
 #![allow(unsafe_code, reason = "the only module that talks to Vulkan; its invariants are stated above")]
 
 mod buffer;
+mod choose;
+mod commands;
 mod descriptor;
 mod device;
 mod handle;
@@ -27,15 +29,16 @@ mod observe;
 mod pass;
 mod physical;
 mod pipeline;
+mod pipeline_layout;
 mod recorder;
 mod scope;
-mod select;
 mod submit;
 mod timer;
 mod transfer;
 
 pub use buffer::{Buffer, BufferUse, Residence};
-pub use descriptor::{Binding, BindingGroup, BindingKind};
+pub use choose::{Choice, DeviceRequest, choose};
+pub use descriptor::{Binding, BindingGroup};
 pub use device::{Device, DeviceOptions, Staging};
 pub use image::{Image, ImageFormat, ImageShape};
 pub use instance::{Instance, InstanceOptions, Validation};
@@ -43,25 +46,25 @@ pub use messages::ValidationLog;
 pub use observe::{ClockMethod, Submission, SubmissionObserver};
 pub use pass::{ClearColor, ColorTarget, ComputePass, RenderPass, RenderTargets, TransferPass};
 pub use physical::{DeviceInfo, DeviceKind, DeviceLimits};
-pub use pipeline::{ComputePipeline, ComputeShader, DepthTest, GraphicsPipeline, GraphicsShaders, PipelineLayout};
+pub use pipeline::{ComputePipeline, ComputeShader, DepthTest, GraphicsPipeline, GraphicsShaders};
+pub use pipeline_layout::{BindingKind, PipelineLayout};
 pub use recorder::Recorder;
-pub use select::{Choice, DeviceRequest, choose};
 pub use timer::{PassTime, Timing};
 pub use transfer::ReadTicket;
 
 use crate::error::Error;
 
-/// The error of a Vulkan call that has no sentence of its own.
+/// The error for a failed Vulkan call that has no more specific error.
 fn call_failed(call: impl Into<String>, result: ash::vk::Result) -> Error {
     refused(call, result.to_string())
 }
 
-/// The error of something that is refused before or without a Vulkan call.
+/// The error for something that is refused without a Vulkan call.
 fn refused(call: impl Into<String>, reason: impl Into<String>) -> Error {
     Error::Vulkan { call: call.into(), reason: reason.into() }
 }
 
-/// Locks `mutex` even if another thread panicked while it held the lock: what is behind our locks is valid at any time.
+/// Locks `mutex` even if another thread panicked while it held the lock: data behind our locks is valid at any time.
 fn lock<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
 }

@@ -1,7 +1,7 @@
-//! Watching a device: every submission of recorded work is told to its observers, and its clock can be read.
+//! Watching a device: its observers are notified of every submission of recorded work, and its clock can be read.
 //!
-//! Observers read the clock of the CPU and write files; nothing here does. Recorders that were created before an observer
-//! came do not tell it anything.
+//! Observers may read the clock of the CPU and write files; nothing here does. A recorder does not notify observers
+//! that were added after its creation.
 
 use std::ffi::CStr;
 use std::fmt::Debug;
@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use ash::{ext, khr, vk};
 
+use super::commands::run_once;
 use super::physical::has_extension;
-use super::submit::run_once;
 use super::timer::Timer;
 use super::{Device, Instance, PassTime, Timing, call_failed, refused};
 use crate::error::Result;
@@ -18,16 +18,16 @@ use crate::error::Result;
 /// A submission of recorded work.
 #[derive(Clone, Copy, Debug)]
 pub struct Submission<'a> {
-    /// Its number on this device, counted from 1 in the order in which submissions are handed over.
+    /// Its number on this device, counted from 1 in the order of submission.
     pub number: u64,
     /// Name of the recorder that made it.
     pub recorder: &'a str,
 }
 
-/// Watches the submissions of a device. Both calls come from the thread that submits and waits, several threads may do so
-/// at once, and neither may use a recorder of the device.
+/// Watches the submissions of a device. The thread that submits makes both calls, and several threads may do so at
+/// once. Neither call may use a recorder of the device.
 pub trait SubmissionObserver: Debug + Send + Sync {
-    /// Whether recorders shall time their passes.
+    /// Whether recorders must time their passes.
     fn timing(&self) -> Timing {
         Timing::Off
     }
@@ -35,26 +35,26 @@ pub trait SubmissionObserver: Debug + Send + Sync {
     /// Called just before the work is handed to the queue.
     fn before(&self, device: &Arc<Device>, submission: &Submission<'_>);
 
-    /// Called when the work is over, with what is known of its passes; nothing if it failed.
+    /// Called when the work is over, with the times of its passes, if known; empty if the work failed.
     fn after(&self, device: &Arc<Device>, submission: &Submission<'_>, passes: &[PassTime]);
 }
 
-/// How the clock of a device is read.
+/// How to read the clock of a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClockMethod {
-    /// At once, by `VK_KHR_calibrated_timestamps` or `VK_EXT_calibrated_timestamps`.
+    /// Directly, by `VK_KHR_calibrated_timestamps` or `VK_EXT_calibrated_timestamps`.
     Calibrated,
-    /// By a submission of its own that writes a timestamp: the reading is from some moment until that is over.
+    /// By a separate submission that writes a timestamp, at some moment before the submission is over.
     Submission,
 }
 
-/// The functions of calibrated timestamps, by the name of the extension that the driver offers.
+/// The functions of calibrated timestamps, from whichever of the two extensions the driver offers.
 pub(super) enum Calibrated {
     Khr(khr::calibrated_timestamps::Device),
     Ext(ext::calibrated_timestamps::Device),
 }
 
-/// Which of the extensions of calibrated timestamps to enable, if the driver offers one and reads its device's clock by it.
+/// The extension of calibrated timestamps to enable, if the driver offers one that can read the device's clock.
 pub(super) fn clock_extension(instance: &Instance, physical: vk::PhysicalDevice) -> Result<Option<&'static CStr>> {
     let entry = instance.entry();
     let names = [khr::calibrated_timestamps::NAME, ext::calibrated_timestamps::NAME];
@@ -104,17 +104,17 @@ impl Calibrated {
 }
 
 impl Device {
-    /// Tells `observer` of every submission of the recorders that are created from now on.
+    /// Notifies `observer` of the submissions of every recorder that is created from now on.
     pub fn observe(&self, observer: Arc<dyn SubmissionObserver>) {
         super::lock(&self.observers).push(observer);
     }
 
-    /// Tells `observer` of no recorder that is created from now on.
+    /// Recorders that are created from now on no longer notify `observer`.
     pub fn stop_observing(&self, observer: &Arc<dyn SubmissionObserver>) {
         super::lock(&self.observers).retain(|other| !Arc::ptr_eq(other, observer));
     }
 
-    /// How the device's clock can be read best; `None` if it has no timestamps.
+    /// The best way to read the device's clock; `None` if it has no timestamps.
     #[must_use]
     pub fn clock_method(&self) -> Option<ClockMethod> {
         let has_timestamps = self.info().limits.timestamp_bits > 0;
@@ -122,7 +122,7 @@ impl Device {
         has_timestamps.then_some(best)
     }
 
-    /// The clock of the device in ticks, as in [`PassTime::start_ticks`], at some moment of this call.
+    /// The clock of the device in ticks, as in [`PassTime::start_ticks`], at some moment during this call.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the device has no such clock, or fails.
@@ -147,7 +147,7 @@ impl Device {
         }
     }
 
-    /// Names of the tools that stand between this program and the driver, such as `RenderDoc`.
+    /// Names of the tools that are active between this program and the driver, such as `RenderDoc`.
     #[must_use]
     pub fn tools(&self) -> Vec<String> {
         let (instance, physical) = (self.instance().raw(), self.physical());

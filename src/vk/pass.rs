@@ -6,15 +6,15 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::commands::record_barrier;
 use super::recorder::Recorder;
 use super::scope::Scope;
-use super::submit::record_barrier;
 use super::{
     BindingGroup, Buffer, ComputePipeline, DepthTest, GraphicsPipeline, Image, ImageFormat, PipelineLayout, refused,
 };
 use crate::error::Result;
 
-/// What a pass has bound, as far as later calls need it.
+/// What later calls need to know about the bound pipeline.
 #[derive(Clone, Copy)]
 struct Bound {
     layout: vk::PipelineLayout,
@@ -22,7 +22,7 @@ struct Bound {
 }
 
 impl Recorder {
-    /// Begins a pass of fills and copies on the device. `name` labels it for debuggers, times and errors.
+    /// Begins a pass of fills and copies on the device. `name` is its label in debuggers, times and errors.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the driver cannot begin a recording.
@@ -31,7 +31,7 @@ impl Recorder {
         Ok(TransferPass { recorder: self })
     }
 
-    /// Begins a pass of compute shaders. `name` labels it for debuggers, times and errors.
+    /// Begins a pass of compute shaders. `name` is its label in debuggers, times and errors.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the driver cannot begin a recording.
@@ -40,7 +40,7 @@ impl Recorder {
         Ok(ComputePass { recorder: self, bound: None })
     }
 
-    /// Begins a pass that clears `targets` and draws into them. `name` labels it for debuggers, times and errors.
+    /// Begins a pass that clears `targets` and draws into them. `name` is its label in debuggers, times and errors.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the targets are smaller than the area or not of the right formats.
@@ -98,7 +98,7 @@ impl Recorder {
             return self.fail_pass(format!("{} bytes of push constants instead of {expected}", bytes.len()));
         }
         if !bytes.is_empty() {
-            let stages = super::pipeline::STAGES;
+            let stages = super::pipeline_layout::STAGES;
             // SAFETY: V1, V3, V4.
             unsafe { self.device().raw().cmd_push_constants(self.commands(), bound.layout, stages, 0, bytes) };
         }
@@ -151,7 +151,7 @@ impl TransferPass<'_> {
         }
     }
 
-    /// Makes what was written so far visible to the rest of the pass.
+    /// Makes everything written so far visible to the rest of the pass.
     pub fn barrier(&mut self) {
         record_barrier(self.recorder.device(), self.recorder.commands(), Scope::Transfer, Scope::Transfer);
     }
@@ -170,32 +170,32 @@ pub struct ComputePass<'a> {
 }
 
 impl ComputePass<'_> {
-    /// Chooses the shader of the next dispatches and what it works on.
+    /// Sets the shader of the next dispatches and its bindings.
     pub fn bind(&mut self, pipeline: &Arc<ComputePipeline>, group: &Arc<BindingGroup>) {
         self.recorder.keep(pipeline);
         let (point, raw) = (vk::PipelineBindPoint::COMPUTE, pipeline.raw());
         self.bound = self.recorder.record_bind(point, raw, pipeline.layout(), group);
     }
 
-    /// Sets all push constants of the pipeline that is bound.
+    /// Sets all push constants of the bound pipeline.
     pub fn push_constants(&mut self, bytes: &[u8]) {
         self.recorder.record_push_constants(self.bound, bytes);
     }
 
-    /// Runs so many workgroups along x, y and z.
+    /// Runs `x` * `y` * `z` workgroups.
     pub fn dispatch(&mut self, x: u32, y: u32, z: u32) {
         if self.bound.is_none() {
             return self.recorder.fail_pass("dispatch without a pipeline");
         }
         let limits = self.recorder.device().info().limits.workgroups;
         if x > limits[0] || y > limits[1] || z > limits[2] {
-            return self.recorder.fail_pass(format!("{x}x{y}x{z} workgroups, of at most {limits:?}"));
+            return self.recorder.fail_pass(format!("{x}x{y}x{z} workgroups exceed the limits {limits:?}"));
         }
         // SAFETY: V1, V2, V3, V4, V5.
         unsafe { self.recorder.device().raw().cmd_dispatch(self.recorder.commands(), x, y, z) };
     }
 
-    /// Makes what the dispatches so far wrote visible to the next ones.
+    /// Makes everything that earlier dispatches wrote visible to the next ones.
     pub fn barrier(&mut self) {
         record_barrier(self.recorder.device(), self.recorder.commands(), Scope::Compute, Scope::Compute);
     }
@@ -312,23 +312,25 @@ pub struct RenderPass<'a> {
 }
 
 impl RenderPass<'_> {
-    /// Chooses the shaders of the next draws and what they work on.
+    /// Sets the shaders of the next draws and their bindings.
     pub fn bind(&mut self, pipeline: &Arc<GraphicsPipeline>, group: &Arc<BindingGroup>) {
         if pipeline.colors() != self.colors || pipeline.depth() != self.depth {
             let name = pipeline.layout().name();
-            return self.recorder.fail_pass(format!("pipeline {name} draws to other formats than the targets"));
+            return self
+                .recorder
+                .fail_pass(format!("pipeline {name} draws to formats other than those of the targets"));
         }
         self.recorder.keep(pipeline);
         let (point, raw) = (vk::PipelineBindPoint::GRAPHICS, pipeline.raw());
         self.bound = self.recorder.record_bind(point, raw, pipeline.layout(), group);
     }
 
-    /// Sets all push constants of the pipeline that is bound.
+    /// Sets all push constants of the bound pipeline.
     pub fn push_constants(&mut self, bytes: &[u8]) {
         self.recorder.record_push_constants(self.bound, bytes);
     }
 
-    /// Draws a strip of so many vertices, once for every instance.
+    /// Draws a triangle strip of `vertices` vertices once for each instance.
     pub fn draw(&mut self, vertices: u32, instances: u32) {
         if self.bound.is_none() {
             return self.recorder.fail_pass("draw without a pipeline");

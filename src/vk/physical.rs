@@ -1,4 +1,4 @@
-//! What a physical device is and what it lacks, as plain data that can be printed and chosen from without a device.
+//! What a physical device is and what it lacks, as plain data that can be printed, and compared without a device.
 
 use std::ffi::CStr;
 
@@ -24,12 +24,12 @@ pub enum DeviceKind {
     Other,
 }
 
-/// The limits of a device that decide what fits.
+/// The limits of a device that decide whether a job fits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceLimits {
-    /// Largest storage buffer that a shader can see, in bytes.
+    /// Largest storage buffer that a shader can access, in bytes.
     pub storage_buffer_bytes: u64,
-    /// Most storage buffers that one shader stage sees.
+    /// Most storage buffers that one shader stage can access.
     pub storage_buffers_per_stage: u32,
     /// Most workgroups of one dispatch along x, y and z.
     pub workgroups: [u32; 3],
@@ -43,47 +43,47 @@ pub struct DeviceLimits {
     pub image_side_px: u32,
     /// Most layers of an image.
     pub image_layers: u32,
-    /// Nanoseconds per step of a timestamp.
+    /// Nanoseconds per tick of a timestamp.
     pub timestamp_period_ns: f32,
-    /// Bits of a timestamp that count; 0 where there are no timestamps.
+    /// Number of valid bits of a timestamp; 0 if there are no timestamps.
     pub timestamp_bits: u32,
 }
 
 impl DeviceLimits {
-    /// Nanoseconds from one timestamp to another, of which only the low bits count; negative if the second one is older.
+    /// Nanoseconds from one timestamp to another; negative if the second one is older. Only the valid bits count.
     #[must_use]
     pub fn ns_between(&self, from_ticks: u64, to_ticks: u64) -> f64 {
         let unused = 64 - self.timestamp_bits.clamp(1, 64);
-        // The highest bit that counts becomes the sign.
+        // The highest valid bit becomes the sign.
         let ticks = (to_ticks.wrapping_sub(from_ticks) << unused).cast_signed() >> unused;
         ticks as f64 * f64::from(self.timestamp_period_ns)
     }
 }
 
-/// A Vulkan device as `smalti devices` lists it.
+/// A description of a Vulkan device.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DeviceInfo {
-    /// Place in the loader's order, counted from 0.
+    /// Position in the loader's list, counted from 0.
     pub index: usize,
     /// Name given by the driver.
     pub name: String,
     /// Kind of hardware.
     pub kind: DeviceKind,
-    /// PCI vendor, or a number that Khronos gave out.
+    /// PCI vendor, or a number that Khronos assigned.
     pub vendor_id: u32,
-    /// Number given to the device by its vendor.
+    /// Number that the vendor gave to the device.
     pub device_id: u32,
     /// Name of the driver; empty below Vulkan 1.3.
     pub driver_name: String,
     /// The driver's own words about its version; empty below Vulkan 1.3.
     pub driver_info: String,
-    /// The driver's version as a plain number; every vendor packs it in its own way.
+    /// The driver's version as a plain number, whose format depends on the vendor.
     pub driver_version: u32,
     /// Vulkan version of the device, such as `1.3.230`.
     pub api_version: String,
     /// Device UUID in lower-case hexadecimal with dashes; empty below Vulkan 1.3.
     pub uuid: String,
-    /// Address on the PCI bus, such as `0000:65:00.0`, where the driver tells it.
+    /// Address on the PCI bus, such as `0000:65:00.0`, if the driver reports it.
     pub pci: Option<String>,
     /// Memory on the device, in bytes.
     pub memory_bytes: u64,
@@ -91,9 +91,9 @@ pub struct DeviceInfo {
     pub subgroup_size: u32,
     /// Groups of subgroup operations that shaders may use.
     pub subgroup_operations: Vec<&'static str>,
-    /// The limits that decide what fits.
+    /// The limits that decide whether a job fits.
     pub limits: DeviceLimits,
-    /// What the device lacks to be used here, in words; empty means that it can be used.
+    /// What the device lacks, in words; empty if it can be used.
     pub missing: Vec<String>,
 }
 
@@ -113,7 +113,7 @@ const SUBGROUP_NAMES: [(vk::SubgroupFeatureFlags, &str); 8] = [
     (vk::SubgroupFeatureFlags::QUAD, "quad"),
 ];
 
-/// Storage buffers that one stage of our largest pipeline sees.
+/// Number of storage buffers that one stage of our largest pipeline uses.
 const STORAGE_BUFFERS: u32 = 13;
 
 /// Asks the driver everything that [`DeviceInfo`] holds.
@@ -123,7 +123,8 @@ pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, ind
     Ok(info)
 }
 
-/// As [`describe`], and what the driver fails to tell is missing: a broken one must not hide the devices of the others.
+/// As [`describe`], but a failure of the driver only adds to [`DeviceInfo::missing`]: a broken driver must not hide the
+/// devices of the others.
 pub(super) fn describe_for_list(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> DeviceInfo {
     let mut info = identity(instance, handle, index);
     if let Err(error) = add_details(instance, handle, &mut info) {
@@ -132,7 +133,7 @@ pub(super) fn describe_for_list(instance: &ash::Instance, handle: vk::PhysicalDe
     info
 }
 
-/// What every driver tells without an error.
+/// What every driver reports without failing.
 fn identity(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> DeviceInfo {
     // SAFETY: V1.
     let properties = unsafe { instance.get_physical_device_properties(handle) };
@@ -166,7 +167,7 @@ fn identity(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) 
 fn add_details(instance: &ash::Instance, handle: vk::PhysicalDevice, info: &mut DeviceInfo) -> Result<()> {
     // SAFETY: V1.
     if unsafe { instance.get_physical_device_properties(handle) }.api_version < vk::API_VERSION_1_3 {
-        // The questions below exist only since Vulkan 1.3; asking an older device would be invalid.
+        // The queries below need Vulkan 1.3; they would be invalid for an older device.
         info.missing.push(format!("Vulkan 1.3 (the driver offers {})", info.api_version));
         return Ok(());
     }
@@ -182,7 +183,7 @@ fn add_details(instance: &ash::Instance, handle: vk::PhysicalDevice, info: &mut 
     Ok(())
 }
 
-/// The first queue family for graphics and compute, and the bits of its timestamps.
+/// The first queue family for graphics and compute, and the number of valid bits of its timestamps.
 pub(super) fn queue_family(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Option<(u32, u32)> {
     // SAFETY: V1.
     let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };

@@ -4,23 +4,16 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::descriptor::{BindingKind, create_set_layout};
 use super::handle::Owned;
 use super::image::ImageFormat;
-use super::{Device, call_failed, refused};
+use super::pipeline_layout::{BindingKind, PipelineLayout};
+use super::{Device, refused};
 use crate::error::Result;
-
-/// The stages that see every binding and every push constant.
-pub(super) const STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
-    vk::ShaderStageFlags::COMPUTE.as_raw()
-        | vk::ShaderStageFlags::VERTEX.as_raw()
-        | vk::ShaderStageFlags::FRAGMENT.as_raw(),
-);
 
 /// First word of every SPIR-V module.
 const SPIRV_MAGIC: u32 = 0x0723_0203;
 
-/// What a compute pipeline is made of.
+/// What a compute pipeline is created from.
 #[derive(Debug, Clone, Copy)]
 pub struct ComputeShader<'a> {
     /// Debug name: the stem of the shader's file.
@@ -40,12 +33,12 @@ pub struct ComputeShader<'a> {
 pub enum DepthTest {
     /// No depth attachment.
     Off,
-    /// A pixel is drawn if it is nearer (less) than what is there.
+    /// A pixel is drawn if it is nearer (its depth is less) than the pixel there.
     Less,
 }
 
-/// What a graphics pipeline is made of. It draws triangle strips without culling or blending; the vertex shader fetches
-/// its vertices from storage buffers.
+/// What a graphics pipeline is created from. It draws triangle strips without culling or blending; the vertex shader
+/// fetches its vertices from storage buffers.
 #[derive(Debug, Clone, Copy)]
 pub struct GraphicsShaders<'a> {
     /// Debug name: the stem of the shaders' files.
@@ -66,67 +59,6 @@ pub struct GraphicsShaders<'a> {
     pub depth: DepthTest,
 }
 
-/// What a pipeline expects to be bound.
-pub struct PipelineLayout {
-    handle: Owned<vk::PipelineLayout>,
-    set_layout: Owned<vk::DescriptorSetLayout>,
-    bindings: Vec<BindingKind>,
-    push_constant_bytes: u32,
-    name: String,
-}
-
-impl PipelineLayout {
-    fn create(device: &Arc<Device>, name: &str, bindings: &[BindingKind], push_constant_bytes: u32) -> Result<Self> {
-        let limit = device.info().limits.push_constant_bytes;
-        if push_constant_bytes > limit || !push_constant_bytes.is_multiple_of(4) {
-            return Err(refused(
-                format!("creation of pipeline {name}"),
-                format!("{push_constant_bytes} bytes of push constants, of at most {limit} in steps of 4"),
-            ));
-        }
-        let set_layout = create_set_layout(device, name, bindings)?;
-        let set_layouts = [set_layout.get()];
-        let ranges = [vk::PushConstantRange::default().stage_flags(STAGES).size(push_constant_bytes)];
-        let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts);
-        if push_constant_bytes > 0 {
-            info = info.push_constant_ranges(&ranges);
-        }
-        // SAFETY: V1.
-        let handle = unsafe { device.raw().create_pipeline_layout(&info, None) }
-            .map_err(|result| call_failed(format!("creation of the layout of pipeline {name}"), result))?;
-        let handle = Owned::new(device, handle, name);
-        Ok(Self { handle, set_layout, bindings: bindings.to_vec(), push_constant_bytes, name: name.to_owned() })
-    }
-
-    /// The kinds of bindings, in order.
-    #[must_use]
-    pub fn bindings(&self) -> &[BindingKind] {
-        &self.bindings
-    }
-
-    /// The name of the pipeline.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    pub(super) fn device(&self) -> &Arc<Device> {
-        self.handle.device()
-    }
-
-    pub(super) fn raw(&self) -> vk::PipelineLayout {
-        self.handle.get()
-    }
-
-    pub(super) fn set_layout(&self) -> vk::DescriptorSetLayout {
-        self.set_layout.get()
-    }
-
-    pub(super) fn push_constant_bytes(&self) -> u32 {
-        self.push_constant_bytes
-    }
-}
-
 /// A compute shader, ready to be dispatched.
 pub struct ComputePipeline {
     handle: Owned<vk::Pipeline>,
@@ -137,7 +69,7 @@ impl ComputePipeline {
     /// Compiles the shader for the device.
     ///
     /// # Errors
-    /// [`crate::Error::Vulkan`] if the module is no SPIR-V or the driver refuses it.
+    /// [`crate::Error::Vulkan`] if the module is not SPIR-V or the driver refuses it.
     pub fn create(device: &Arc<Device>, shader: &ComputeShader<'_>) -> Result<Arc<Self>> {
         let name = shader.name;
         let layout = PipelineLayout::create(device, name, shader.bindings, shader.push_constant_bytes)?;
@@ -175,7 +107,7 @@ impl GraphicsPipeline {
     /// Compiles the shaders for the device.
     ///
     /// # Errors
-    /// [`crate::Error::Vulkan`] if a module is no SPIR-V or the driver refuses it.
+    /// [`crate::Error::Vulkan`] if a module is not SPIR-V or the driver refuses it.
     pub fn create(device: &Arc<Device>, shaders: &GraphicsShaders<'_>) -> Result<Arc<Self>> {
         let name = shaders.name;
         let layout = PipelineLayout::create(device, name, shaders.bindings, shaders.push_constant_bytes)?;
@@ -312,7 +244,7 @@ fn take_one(
     created: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>,
 ) -> Result<Owned<vk::Pipeline>> {
     let failed = |reason: String| refused(format!("creation of pipeline {name}"), reason);
-    // A failed call returns only null handles, as it was asked for one pipeline.
+    // If the call fails, all its handles are null, since it was asked for only one pipeline.
     let pipelines = created.map_err(|(_, result)| failed(result.to_string()))?;
     let pipeline = pipelines.first().ok_or_else(|| failed("the driver returned no pipeline".to_owned()))?;
     Ok(Owned::new(device, *pipeline, name))

@@ -1,7 +1,7 @@
 //! The recorder: the only way to give work to the device.
 //!
-//! A submission is made of writes, passes and reads. Writes take effect before its first pass and reads after its last,
-//! whatever the order of the calls, so they mean the same on devices with and without staging.
+//! A submission consists of writes, passes and reads. Writes take effect before its first pass and reads after its last
+//! pass, whatever the order of the calls, so the result is the same on devices with and without staging.
 
 use std::any::Any;
 use std::ffi::CStr;
@@ -9,20 +9,20 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::commands::{allocate_command_buffers, begin_commands, create_command_pool, end_commands, record_barrier};
 use super::handle::Owned;
 use super::scope::Scope;
-use super::submit::{allocate_command_buffers, begin_commands, create_command_pool, end_commands, record_barrier};
 use super::timer::{READ_BACKS, Timer, UPLOADS};
 use super::transfer::{ReadBacks, ReadTicket, Uploads};
 use super::{Buffer, Device, Image, ImageFormat, PassTime, SubmissionObserver, Timing, call_failed, lock, refused};
 use crate::error::{Error, Result};
 
-/// Records one submission after the other and runs them.
+/// Records submissions and runs them, one after another.
 pub struct Recorder {
     timer: Option<Timer>,
     uploads: Uploads,
     read_backs: ReadBacks,
-    /// What the commands name; alive until the fence.
+    /// Objects that the commands use, kept alive until the fence.
     kept: Vec<Arc<dyn Any + Send + Sync>>,
     upload_commands: vk::CommandBuffer,
     pass_commands: vk::CommandBuffer,
@@ -30,11 +30,11 @@ pub struct Recorder {
     pool: Owned<vk::CommandPool>,
     fence: Owned<vk::Fence>,
     is_recording: bool,
-    /// Of what is recorded or ran last; tickets carry it.
+    /// Number of the current or last recording; tickets carry it.
     recording: u64,
     last_scope: Scope,
     last_pass: &'static str,
-    /// A pass that is leaked instead of dropped leaves this set.
+    /// Stays true if a pass is leaked instead of dropped.
     is_pass_open: bool,
     stop_query: Option<u32>,
     label: Vec<u8>,
@@ -45,8 +45,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates a recorder; its staging buffers come with their first use. It also times its passes if an observer of the
-    /// device asks for that.
+    /// Creates a recorder. Its staging buffers are created when first used. Whatever `timing` says, it times its passes
+    /// if an observer of the device asks for that.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the driver refuses.
@@ -90,8 +90,8 @@ impl Recorder {
         &self.device
     }
 
-    /// Writes `bytes` at `offset` of the buffer, before the first pass of this submission. Of two writes to the same byte
-    /// the later call wins.
+    /// Writes `bytes` at `offset` of the buffer, before the first pass of this submission. If two writes cover the same
+    /// byte, the later call wins.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the range is outside the buffer.
@@ -108,7 +108,7 @@ impl Recorder {
     /// Writes a whole layer of a texture, rows packed tightly, before the first pass of this submission.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if the image is no texture, has no such layer, or `bytes` are not those of a layer.
+    /// [`Error::Vulkan`] if the image is not a texture, has no such layer, or `bytes` has not the size of a layer.
     pub fn write_image_layer(&mut self, image: &Arc<Image>, layer: u32, bytes: &[u8]) -> Result<()> {
         self.begin()?;
         let fits = layer < image.shape().layers && bytes.len() as u64 == image.layer_bytes();
@@ -122,7 +122,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Asks for `size_bytes` at `offset` of the buffer, as they are after the last pass of this submission.
+    /// Asks for `size_bytes` bytes at `offset` of the buffer, as they are after the last pass of this submission.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the range is outside the buffer.
@@ -133,16 +133,17 @@ impl Recorder {
         Ok(ReadTicket { recording: self.recording, buffer, offset, size_bytes })
     }
 
-    /// Asks for the pixels of a colour attachment, rows packed tightly, as they are after the last pass of this submission.
+    /// Asks for the pixels of a colour attachment, rows packed tightly, as they are after the last pass of this
+    /// submission.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if the image is no colour attachment.
+    /// [`Error::Vulkan`] if the image is not a colour attachment.
     pub fn read_image(&mut self, image: &Arc<Image>) -> Result<ReadTicket> {
         self.begin()?;
         if !matches!(image.format(), ImageFormat::Rgba8Unorm | ImageFormat::R32Uint) {
             return Err(refused(
                 format!("read of image {}", image.name()),
-                format!("{:?} is no format of a colour attachment", image.format()),
+                format!("{:?} is not the format of a colour attachment", image.format()),
             ));
         }
         let offset = self.read_backs.add_image(image);
@@ -150,28 +151,28 @@ impl Recorder {
         Ok(ReadTicket { recording: self.recording, buffer: None, offset, size_bytes })
     }
 
-    /// Fetches the bytes of a ticket, after its submission and before anything else is recorded.
+    /// Copies the bytes of a ticket. Call this after its submission, before anything else is recorded.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if the ticket is of another submission, or `bytes` has another size.
+    /// [`Error::Vulkan`] if the ticket belongs to another submission, or `bytes` has another size.
     pub fn read_into(&self, ticket: &ReadTicket, bytes: &mut [u8]) -> Result<()> {
         if bytes.len() as u64 != ticket.size_bytes {
             return Err(refused(
                 "read-back",
-                format!("{} bytes asked for of a ticket for {}", bytes.len(), ticket.size_bytes),
+                format!("{} bytes requested from a ticket for {}", bytes.len(), ticket.size_bytes),
             ));
         }
         self.look(ticket, |read| bytes.copy_from_slice(read))
     }
 
-    /// Looks at the bytes of a ticket where they lie, without copying them, after its submission and before anything else is
-    /// recorded. They may lie at any address.
+    /// Calls `look` with the bytes of a ticket, without copying them. Call this after its submission, before anything
+    /// else is recorded. The bytes may have any alignment.
     ///
     /// # Errors
-    /// [`Error::Vulkan`] if the ticket is of another submission.
+    /// [`Error::Vulkan`] if the ticket belongs to another submission.
     pub fn look<T>(&self, ticket: &ReadTicket, look: impl FnOnce(&[u8]) -> T) -> Result<T> {
         if self.is_recording || ticket.recording != self.recording {
-            return Err(refused("read-back", "the ticket is not of the submission that ran last"));
+            return Err(refused("read-back", "the ticket does not belong to the last submission"));
         }
         match &ticket.buffer {
             Some(buffer) => buffer.look(ticket.offset, ticket.size_bytes, look),
@@ -185,7 +186,7 @@ impl Recorder {
         self.timer.as_ref().map_or(&[], Timer::times)
     }
 
-    /// Starts a submission unless one is being recorded.
+    /// Starts a recording unless one is in progress.
     pub(super) fn begin(&mut self) -> Result<()> {
         if self.is_recording {
             return Ok(());
@@ -204,7 +205,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Opens a pass: the barrier to what came before, its label and its clock.
+    /// Opens a pass: records the barrier after earlier work, and starts its label and its clock.
     pub(super) fn begin_pass(&mut self, name: &'static str, scope: Scope) -> Result<()> {
         self.begin()?;
         self.require_closed()?;
@@ -262,9 +263,9 @@ impl Recorder {
         self.pass_commands
     }
 
-    /// Keeps an object that the commands name until they have run.
+    /// Keeps an object that the commands use until they have run.
     pub(super) fn keep<T: Any + Send + Sync>(&mut self, object: &Arc<T>) {
-        // A pass names the same few things over and over.
+        // A pass uses the same few objects over and over.
         let recent = self.kept.iter().rev().take(4);
         let address = Arc::as_ptr(object).cast::<()>();
         if !recent.map(|kept| Arc::as_ptr(kept).cast::<()>()).any(|kept| std::ptr::eq(kept, address)) {
@@ -272,12 +273,12 @@ impl Recorder {
         }
     }
 
-    /// Remembers the first error of a recording, to be returned when it is submitted.
+    /// Stores the first error of a recording, which its submission will return.
     pub(super) fn fail(&mut self, error: Error) {
         self.failure.get_or_insert(error);
     }
 
-    /// Records the writes before and the reads after the passes, and ends the command buffers.
+    /// Records the writes before the passes and the reads after them, and ends the command buffers.
     pub(super) fn finish_recording(&mut self) -> Result<()> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
@@ -296,7 +297,7 @@ impl Recorder {
             end_commands(&self.device, commands)?;
         }
         if self.read_backs.has_copies() {
-            // The last pass keeps its name in errors: copies do not fail.
+            // Errors keep naming the last pass, since copies do not fail.
             let last_pass = self.last_pass;
             self.begin_pass(READ_BACKS, Scope::Transfer)?;
             self.read_backs.record(&self.device, self.pass_commands)?;
@@ -309,7 +310,7 @@ impl Recorder {
         end_commands(&self.device, self.pass_commands)
     }
 
-    /// Forgets the submission; its results stay readable. Nothing may be in flight.
+    /// Clears the recording; results stay readable. Nothing may be in flight.
     pub(super) fn clear(&mut self) {
         self.is_recording = false;
         self.is_pass_open = false;

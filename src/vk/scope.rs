@@ -1,14 +1,14 @@
-//! Which stages and accesses a kind of work stands for: the table from which every barrier is made.
+//! The stages and accesses of each kind of work: the table that every barrier comes from.
 //!
-//! A scope names the same stages whether work comes before or after a barrier, so barriers chain: what a first pass
-//! wrote is visible to a third one even if the second touched none of it.
+//! A scope has the same stages before and after a barrier, so barriers chain: what a first pass wrote is visible to a
+//! third one even if the second one did not touch it.
 
 use ash::vk;
 
 /// A kind of work, as seen by the barrier before or after it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scope {
-    /// Whatever the queue did before: earlier submissions, and the uploads at the start of this one.
+    /// Everything that the queue did before: earlier submissions, and the uploads at the start of this one.
     Earlier,
     /// Copies and fills.
     Transfer,
@@ -65,7 +65,7 @@ impl Scope {
     }
 }
 
-/// The barrier that lets `next` start after `previous`: its writes are visible, and its reads are over.
+/// The barrier that lets `next` start after `previous`, whose writes are then visible and whose reads are over.
 pub(super) fn barrier(previous: Scope, next: Scope) -> vk::MemoryBarrier2<'static> {
     vk::MemoryBarrier2::default()
         .src_stage_mask(previous.stages())

@@ -4,19 +4,19 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::handle::Owned;
+use super::Submission;
+use super::commands::submission_failed;
 use super::recorder::Recorder;
-use super::scope::{self, Scope};
-use super::{Device, Submission, call_failed, refused};
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 impl Recorder {
-    /// Runs what was recorded, in one submission, and waits until it is over: first all writes, then the passes in order,
-    /// then all reads. Without anything recorded it does nothing. Afterwards the recorder is empty again, also if it failed.
+    /// Runs the recording in one submission and waits until it is over: first all writes, then the passes in order,
+    /// then all reads. If nothing was recorded, it does nothing. Afterwards the recorder is empty again, even after a
+    /// failure.
     ///
     /// # Errors
-    /// The first error of the recording, if there was one, and then nothing runs; [`Error::DeviceLost`] if the device
-    /// stopped working; [`Error::OutOfDeviceMemory`] if a staging buffer had to grow and could not.
+    /// The first error of the recording, if there was one, in which case nothing runs; [`crate::Error::DeviceLost`] if
+    /// the device stopped working; [`crate::Error::OutOfDeviceMemory`] if a staging buffer had to grow and could not.
     pub fn submit_and_wait(&mut self) -> Result<()> {
         if !self.is_recording() {
             return Ok(());
@@ -26,7 +26,7 @@ impl Recorder {
         outcome
     }
 
-    /// Runs the command buffers and tells the observers.
+    /// Runs the command buffers and notifies the observers.
     fn run_observed(&mut self) -> Result<()> {
         let device = Arc::clone(self.device());
         let number = device.next_submission();
@@ -35,7 +35,7 @@ impl Recorder {
         let outcome = self.run().and_then(|()| self.collect_times());
         let submission = Submission { number, recorder: self.name() };
         let passes = if outcome.is_ok() { self.pass_times() } else { &[] };
-        // In the reverse order, so that the spans of observers nest.
+        // In reverse order, so that the spans of observers nest.
         self.observers().iter().rev().for_each(|observer| observer.after(&device, &submission, passes));
         outcome
     }
@@ -61,107 +61,9 @@ impl Recorder {
         }
         // SAFETY: V1.
         unsafe { device.raw().wait_for_fences(&fence, true, u64::MAX) }.map_err(|result| {
-            // V2: what the commands use is dropped next.
+            // V2: the objects that the commands use are dropped next.
             device.wait_idle();
             failed("vkWaitForFences", result)
         })
-    }
-}
-
-/// The error of a failed submission. A lost device and full memory have variants of their own; both name the last pass.
-fn submission_failed(call: &str, result: vk::Result, last_pass: &str) -> Error {
-    match result {
-        vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { last_pass: last_pass.to_owned() },
-        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-            Error::OutOfMemory { call: format!("{call} after pass {last_pass}") }
-        }
-        other => call_failed(format!("{call} after pass {last_pass}"), other),
-    }
-}
-
-/// Records the barrier between two kinds of work.
-pub(super) fn record_barrier(device: &Device, commands: vk::CommandBuffer, previous: Scope, next: Scope) {
-    let barriers = [scope::barrier(previous, next)];
-    let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
-    // SAFETY: V1, V3, V5.
-    unsafe { device.raw().cmd_pipeline_barrier2(commands, &dependency) };
-}
-
-/// Creates a command pool whose buffers are reset together.
-pub(super) fn create_command_pool(device: &Arc<Device>, name: &str) -> Result<Owned<vk::CommandPool>> {
-    let info = vk::CommandPoolCreateInfo::default()
-        .flags(vk::CommandPoolCreateFlags::TRANSIENT)
-        .queue_family_index(device.queue_family());
-    // SAFETY: V1.
-    let pool = unsafe { device.raw().create_command_pool(&info, None) }
-        .map_err(|result| call_failed(format!("creation of command pool {name}"), result))?;
-    Ok(Owned::new(device, pool, name))
-}
-
-/// Takes `COUNT` command buffers from a pool, which owns them.
-pub(super) fn allocate_command_buffers<const COUNT: usize>(
-    pool: &Owned<vk::CommandPool>,
-) -> Result<[vk::CommandBuffer; COUNT]> {
-    let info = vk::CommandBufferAllocateInfo::default().command_pool(pool.get()).command_buffer_count(COUNT as u32);
-    // SAFETY: V1.
-    let buffers = unsafe { pool.device().raw().allocate_command_buffers(&info) }
-        .map_err(|result| call_failed("vkAllocateCommandBuffers", result))?;
-    buffers.try_into().map_err(|_| refused("vkAllocateCommandBuffers", "fewer buffers than asked for"))
-}
-
-/// Starts the recording of a command buffer that is submitted once.
-pub(super) fn begin_commands(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
-    let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-    // SAFETY: V1, V2, V3.
-    unsafe { device.raw().begin_command_buffer(commands, &info) }
-        .map_err(|result| call_failed("vkBeginCommandBuffer", result))
-}
-
-/// Ends the recording of a command buffer.
-pub(super) fn end_commands(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
-    // SAFETY: V1, V3.
-    unsafe { device.raw().end_command_buffer(commands) }.map_err(|result| call_failed("vkEndCommandBuffer", result))
-}
-
-/// Records and runs a few commands outside of any recorder: preparations that happen once.
-pub(super) fn run_once(device: &Arc<Device>, name: &str, record: impl FnOnce(vk::CommandBuffer)) -> Result<()> {
-    let pool = create_command_pool(device, name)?;
-    let [commands] = allocate_command_buffers(&pool)?;
-    device.set_name(commands, name);
-    begin_commands(device, commands)?;
-    record(commands);
-    end_commands(device, commands)?;
-    let infos = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
-    let submits = [vk::SubmitInfo2::default().command_buffer_infos(&infos)];
-    let failed = |call: &str, result| submission_failed(call, result, name);
-    let queue = device.queue();
-    // SAFETY: V1, V2, V3: the pool is dropped after the queue is idle.
-    unsafe {
-        device
-            .raw()
-            .queue_submit2(*queue, &submits, vk::Fence::null())
-            .map_err(|result| failed("vkQueueSubmit2", result))?;
-        device.raw().queue_wait_idle(*queue).map_err(|result| failed("vkQueueWaitIdle", result))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_lost_device_is_told_with_the_last_pass() {
-        let lost = submission_failed("vkQueueSubmit2", vk::Result::ERROR_DEVICE_LOST, "evaluate");
-        assert!(matches!(&lost, Error::DeviceLost { last_pass } if last_pass == "evaluate"));
-        let other = submission_failed("vkQueueSubmit2", vk::Result::ERROR_UNKNOWN, "evaluate");
-        assert!(other.to_string().contains("vkQueueSubmit2 after pass evaluate"), "{other}");
-    }
-
-    #[test]
-    fn full_memory_is_told_with_the_last_pass() {
-        for result in [vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_OUT_OF_HOST_MEMORY] {
-            let full = submission_failed("vkWaitForFences", result, "evaluate");
-            assert!(matches!(&full, Error::OutOfMemory { call } if call.contains("pass evaluate")), "{full}");
-        }
     }
 }

@@ -8,7 +8,8 @@ use super::handle::Owned;
 use super::{Device, call_failed};
 use crate::error::Result;
 
-/// Passes of one submission that are timed; later ones are not, so that the pool never has to grow while it is in use.
+/// Number of passes of one submission that are timed. Later passes are not, so the pool never has to grow while it is
+/// in use.
 const MAX_PASSES: u32 = 256;
 /// Queries of a pool.
 const QUERIES: u32 = 2 * MAX_PASSES + 2;
@@ -23,7 +24,7 @@ pub enum Timing {
     /// No timestamps.
     #[default]
     Off,
-    /// The first 256 passes of every submission, where the device has timestamps.
+    /// It measures the first 256 passes of every submission, if the device has timestamps.
     On,
 }
 
@@ -34,7 +35,7 @@ pub struct PassTime {
     pub name: &'static str,
     /// Milliseconds on the device.
     pub ms: f64,
-    /// When it began, by the device's clock; [`super::DeviceLimits::ns_between`] tells what the ticks are.
+    /// When it began, by the device's clock; [`super::DeviceLimits::ns_between`] converts ticks.
     pub start_ticks: u64,
 }
 

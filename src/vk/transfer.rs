@@ -1,13 +1,13 @@
-//! The way of bytes between the host and the device: writes gathered for the start of a submission, reads for its end.
+//! Transfers between the host and the device: writes are collected for the start of a submission, reads for its end.
 //!
-//! Both reuse one staging buffer each, which grows geometrically, so the steady state creates nothing.
+//! Each direction reuses one staging buffer, which grows geometrically, so the steady state creates nothing.
 
 use std::sync::Arc;
 
 use ash::vk;
 
+use super::commands::record_barrier;
 use super::scope::Scope;
-use super::submit::record_barrier;
 use super::{Buffer, BufferUse, Device, Image, Residence};
 use crate::error::Result;
 
@@ -17,7 +17,7 @@ const FIRST_STAGING_BYTES: u64 = 64 << 10;
 /// Offsets of image copies are multiples of this, which every pixel size divides.
 const IMAGE_ALIGNMENT: usize = 16;
 
-/// A claim on bytes that a submission reads back; honoured by [`super::Recorder::read_into`] until the next recording.
+/// Stands for bytes that a submission reads back. [`super::Recorder::read_into`] returns them until the next recording.
 #[derive(Clone)]
 pub struct ReadTicket {
     pub(super) recording: u64,
@@ -27,7 +27,7 @@ pub struct ReadTicket {
 }
 
 impl ReadTicket {
-    /// The number of bytes to be had.
+    /// The number of bytes that it stands for.
     #[must_use]
     pub fn size_bytes(&self) -> u64 {
         self.size_bytes
@@ -55,7 +55,7 @@ impl StagingBuffer {
     }
 }
 
-/// One write to a buffer: the place in [`Uploads::targets`], and the copy from staging.
+/// One write to a buffer: its index in [`Uploads::targets`], and the copy from staging.
 #[derive(Clone, Copy)]
 struct Region {
     target: usize,
@@ -115,7 +115,7 @@ impl Uploads {
         self.regions.push(Region { target, copy: vk::BufferCopy { src_offset, dst_offset: offset, size } });
     }
 
-    /// Adds a write of a whole layer; a later write of the same layer takes its place.
+    /// Adds a write of a whole layer; a later write of the same layer replaces it.
     pub(super) fn add_image_layer(&mut self, image: &Arc<Image>, layer: u32, bytes: &[u8]) {
         let same = |copy: &vk::BufferImageCopy| copy.image_subresource.base_array_layer == layer;
         if let Some((_, copy)) = self.images.iter().find(|(other, copy)| Arc::ptr_eq(other, image) && same(copy)) {
@@ -130,7 +130,7 @@ impl Uploads {
     }
 
     fn target_of(&mut self, buffer: &Arc<Buffer>) -> usize {
-        // From the end: writes come in runs to the same buffer.
+        // From the end, since consecutive writes often go to the same buffer.
         if let Some(target) = self.targets.iter().rposition(|target| Arc::ptr_eq(target, buffer)) {
             return target;
         }
@@ -149,7 +149,8 @@ impl Uploads {
             let target = self.targets[regions[0].target].raw();
             self.batch.clear();
             if overlap(regions) {
-                // Copies of one call run in any order, so each needs a call of its own; bytes were staged in call order.
+                // Copies within one call run in any order, so each gets a call of its own. Bytes were staged in call
+                // order.
                 regions.sort_unstable_by_key(|region| region.copy.src_offset);
                 for region in regions {
                     record_copies(device, commands, source, target, &[region.copy]);
@@ -286,11 +287,11 @@ impl ReadBacks {
         Ok(())
     }
 
-    /// Looks at read-back bytes of the last submission in the staging buffer.
+    /// Calls `look` with bytes in the staging buffer that the last submission read back.
     pub(super) fn look<T>(&self, offset: u64, size_bytes: u64, look: impl FnOnce(&[u8]) -> T) -> Result<T> {
         match &self.staging.buffer {
             Some(staging) => staging.look(offset, size_bytes, look),
-            // Without a staging buffer nothing was copied: only empty reads come here.
+            // Without a staging buffer nothing was copied, so the read must be empty.
             None => Ok(look(&[])),
         }
     }

@@ -1,4 +1,5 @@
-//! Where the files of `smalti batch` may not go: over those that it reads, over one another, and where it would find them again.
+//! Where the outputs of `smalti batch` may not go: over its inputs, over one another, and where a second run would take
+//! them for inputs.
 
 use std::fs::File;
 use std::time::{Duration, SystemTime};

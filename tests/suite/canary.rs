@@ -1,5 +1,5 @@
-//! The validation canary: runs a test on software Vulkan under the validation layer and fails it if the layer complains,
-//! be it about a missing barrier or about an object that outlives its device.
+//! The validation canary: runs a test on software Vulkan under the validation layer and fails it if the layer
+//! complains, for instance about a missing barrier or about an object that outlives its device.
 //!
 //! With `SMALTI_TEST_STAGING=forced` in the environment every test goes through staging, as on a discrete GPU; software
 //! Vulkan would never take that path by itself.

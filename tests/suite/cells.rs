@@ -39,7 +39,7 @@ pub fn course(style: &Style, target: Target, fly_count: usize) -> Course {
             guide::flowing(&target, &guide::Flow { tile_side: side, smoothing, size_strength_q8, weights: None })
         }
     };
-    let mut rules = style.rules(7, (side, fly_count), [90, 80, 70], [60, 50, 40]);
+    let mut rules = style.rules(7, side, fly_count, [90, 80, 70], [60, 50, 40]);
     let masks = if style.masks.is_empty() { MaskSet::default() } else { holed_masks() };
     (rules.mask_first, rules.mask_count) =
         (1.min(masks.layers().len() as u32 - 1), masks.layers().len().max(2) as u32 - 1);

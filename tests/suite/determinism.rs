@@ -1,12 +1,12 @@
 //! Same picture, options and seed: the same population and the same pixels, whatever evaluates and however.
 
 use sha2::{Digest, Sha256};
-use smalti::cpu::CpuEvaluator;
-use smalti::engine::{Engine, Undisturbed};
+use smalti::cpu::{CpuEvaluator, CpuPainter};
+use smalti::engine::Engine;
 use smalti::evolve::evolution::random_population;
-use smalti::evolve::{ALGORITHM_VERSION, Evolution, Outcome, PaperScheme};
-use smalti::gpu::GpuEvaluator;
-use smalti::model::{Canvas, Evaluator, Fly, Mosaic, Population, Scene};
+use smalti::evolve::{ALGORITHM_VERSION, Evolution, Outcome, PaperScheme, Undisturbed};
+use smalti::gpu::{GpuEvaluator, GpuPainter};
+use smalti::model::{Canvas, Evaluator, Fly, Mosaic, Painter, Population, Scene};
 use smalti::vk::DeviceOptions;
 
 use crate::canary;
@@ -15,7 +15,7 @@ use crate::scenarios::{random_scene, stream};
 /// All that an evolution leads to.
 type Result = (Vec<Fly>, u64, Vec<i64>, Outcome, Mosaic);
 
-fn evolve(evaluator: Box<dyn Evaluator>, scheme: PaperScheme) -> Result {
+fn evolve(evaluator: Box<dyn Evaluator>, painter: &mut dyn Painter, scheme: PaperScheme) -> Result {
     let scene = evaluator.scene(0).clone();
     let (width_px, height_px) = (scene.target.width_px(), scene.target.height_px());
     let flies = random_population(width_px, height_px, scene.fly_count, scheme.seed);
@@ -36,7 +36,7 @@ fn evolve(evaluator: Box<dyn Evaluator>, scheme: PaperScheme) -> Result {
     assert_eq!(evaluation.sae, sae, "the best population is loaded when the evolution has ended");
     let marginal = evaluation.marginal.to_vec();
     let canvas = Canvas::scaled(width_px, height_px, 450);
-    let mosaic = engine.evaluator().draw(&population, &canvas, 2).expect("the evaluator works");
+    let mosaic = painter.draw(&population, &canvas, 2).expect("the painter works");
     (best, sae, marginal, outcome, mosaic)
 }
 
@@ -47,14 +47,16 @@ fn scene() -> Scene {
 
 fn on_threads(threads: usize, scheme: &PaperScheme) -> Result {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a small pool");
-    pool.install(|| evolve(Box::new(CpuEvaluator::new(vec![scene()])), scheme.clone()))
+    pool.install(|| evolve(Box::new(CpuEvaluator::new(vec![scene()])), &mut CpuPainter, scheme.clone()))
 }
 
 fn check_everywhere(scheme: &PaperScheme) {
     let one = on_threads(1, scheme);
     assert_eq!(one, on_threads(2, scheme), "two threads");
     let vulkan = canary::with_device(&DeviceOptions::default(), |device| {
-        evolve(Box::new(GpuEvaluator::create(&device, vec![scene()]).expect("it fits")), scheme.clone())
+        let evaluator = GpuEvaluator::create(&device, vec![scene()]).expect("it fits");
+        let mut painter = GpuPainter::create(&device).expect("the device works");
+        evolve(Box::new(evaluator), &mut painter, scheme.clone())
     });
     assert_eq!(one, vulkan, "software Vulkan");
     let other_seed = on_threads(1, &PaperScheme { seed: scheme.seed + 1, ..scheme.clone() });

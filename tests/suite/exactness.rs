@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use smalti::cpu::CpuEvaluator;
-use smalti::gpu::{GpuEvaluator, KernelShape};
+use smalti::cpu::{CpuEvaluator, CpuPainter};
+use smalti::gpu::{GpuEvaluator, GpuPainter, KernelShape};
 use smalti::model::fly::SIDE_MAX;
 use smalti::model::mask::Texel;
-use smalti::model::{Blend, Canvas, Change, Evaluator, Fly, Mask, MaskSet, NO_FLY, Population, Scene, Target};
+use smalti::model::{Blend, Canvas, Change, Evaluator, Fly, Mask, MaskSet, NO_FLY, Painter, Population, Scene, Target};
 
 use smalti::vk::{DeviceOptions, Staging};
 
@@ -20,7 +20,7 @@ use crate::scenarios::{
 /// Flies whose marginal fitness is also checked by leaving them out of a whole picture.
 const RE_RENDERS: usize = 500;
 
-fn check_scenario(evaluator: &mut dyn Evaluator, scenario: &Scenario) {
+fn check_scenario(evaluator: &mut dyn Evaluator, painter: &mut dyn Painter, scenario: &Scenario) {
     let Scenario { name, scene, flies } = scenario;
     evaluator.load(&[(0, flies)]).expect("the evaluator works");
     let reference = Reference::new(scene, flies);
@@ -37,7 +37,7 @@ fn check_scenario(evaluator: &mut dyn Evaluator, scenario: &Scenario) {
     assert_eq!(layers.under, reference.layer(1), "{name}: under layer");
 
     let canvas = Canvas::evaluation(scene.target.width_px(), scene.target.height_px());
-    let mosaic = evaluator.draw(&population(scene, flies), &canvas, 1).expect("the evaluator works");
+    let mosaic = painter.draw(&population(scene, flies), &canvas, 1).expect("the painter works");
     assert_eq!(mosaic.pixels, reference.colors(), "{name}: drawn mosaic");
 }
 
@@ -55,14 +55,14 @@ pub fn population(scene: &Scene, flies: &[Fly]) -> Population {
 #[test]
 fn on_the_cpu_translucent_fitness_layers_and_mosaic_equal_brute_force() {
     for scenario in translucent_scenarios().into_iter().chain(deep_stacks()) {
-        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &scenario);
+        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &mut CpuPainter, &scenario);
     }
 }
 
 #[test]
 fn on_the_cpu_fitness_layers_and_mosaic_equal_brute_force() {
     for scenario in scenarios() {
-        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &scenario);
+        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &mut CpuPainter, &scenario);
     }
 }
 
@@ -71,8 +71,9 @@ fn on_vulkan_fitness_layers_and_mosaic_equal_brute_force() {
     for scenario in scenarios() {
         canary::with_device(&DeviceOptions::default(), |device| {
             let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
-            check_scenario(&mut evaluator, &scenario);
-            let drawn = evaluator.draw_fly_layer(&population(&scenario.scene, &scenario.flies)).expect("it draws");
+            let mut painter = GpuPainter::create(&device).expect("the device works");
+            check_scenario(&mut evaluator, &mut painter, &scenario);
+            let drawn = painter.draw_fly_layer(&population(&scenario.scene, &scenario.flies)).expect("it draws");
             let layers = evaluator.read_back_layers(0).expect("the evaluator works");
             assert_eq!(drawn, layers.top, "{}: the graphics pass and the compute pass differ", scenario.name);
         });
@@ -84,7 +85,8 @@ fn on_vulkan_translucent_fitness_layers_and_mosaic_equal_brute_force() {
     for scenario in translucent_scenarios().into_iter().chain(deep_stacks()) {
         canary::with_device(&DeviceOptions::default(), |device| {
             let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
-            check_scenario(&mut evaluator, &scenario);
+            let mut painter = GpuPainter::create(&device).expect("the device works");
+            check_scenario(&mut evaluator, &mut painter, &scenario);
         });
     }
 }
@@ -92,10 +94,11 @@ fn on_vulkan_translucent_fitness_layers_and_mosaic_equal_brute_force() {
 #[test]
 fn every_mask_under_every_shader_equals_brute_force_on_the_cpu_and_on_vulkan() {
     for scenario in dressed_scenarios() {
-        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &scenario);
+        check_scenario(&mut CpuEvaluator::new(vec![scenario.scene.clone()]), &mut CpuPainter, &scenario);
         canary::with_device(&DeviceOptions::default(), |device| {
             let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
-            check_scenario(&mut evaluator, &scenario);
+            let mut painter = GpuPainter::create(&device).expect("the device works");
+            check_scenario(&mut evaluator, &mut painter, &scenario);
         });
     }
 }
@@ -110,7 +113,8 @@ fn every_kernel_shape_gives_the_same_numbers_directly_and_through_staging() {
             for scenario in &all.filter(|scenario| scenario.flies.len() <= 300).collect::<Vec<_>>() {
                 let scenes = vec![scenario.scene.clone()];
                 let mut evaluator = GpuEvaluator::create_with_shape(&device, scenes, shape).expect("it fits");
-                check_scenario(&mut evaluator, scenario);
+                let mut painter = GpuPainter::create(&device).expect("the device works");
+                check_scenario(&mut evaluator, &mut painter, scenario);
             }
         });
     }
@@ -125,16 +129,15 @@ fn translucent_tiles_are_drawn_alike_at_any_size_and_supersampling() {
                 continue;
             }
             let population = population(&scene, &flies);
-            let mut cpu = CpuEvaluator::new(vec![scene.clone()]);
-            let mut vulkan = GpuEvaluator::create(&device, vec![scene]).expect("it fits");
+            let mut vulkan = GpuPainter::create(&device).expect("the device works");
             // The last spans several patches of samples.
             let sizes = [(17, 1), (150, 3), (1_100, 1)];
             for (long_side_px, supersampling) in sizes.into_iter().take(if flies.len() > 1_000 { 1 } else { 3 }) {
                 let canvas = Canvas::scaled(width_px, height_px, long_side_px);
-                let draw = |evaluator: &mut dyn Evaluator| {
-                    evaluator.draw(&population, &canvas, supersampling).expect("the evaluator works")
+                let draw = |painter: &mut dyn Painter| {
+                    painter.draw(&population, &canvas, supersampling).expect("the painter works")
                 };
-                let same = draw(&mut cpu) == draw(&mut vulkan);
+                let same = draw(&mut CpuPainter) == draw(&mut vulkan);
                 assert!(same, "{name} at {long_side_px} px with {supersampling}² samples");
             }
         }
@@ -245,7 +248,7 @@ fn on_vulkan_lanes_of_different_sizes_and_blends_equal_single_ones() {
 }
 
 /// With coverage of nothing or all, translucent tiles are opaque ones.
-fn check_opaque_equivalence(mut create: impl FnMut(Scene) -> Box<dyn Evaluator>) {
+fn check_opaque_equivalence(mut create: impl FnMut(Scene) -> Box<dyn Evaluator>, painter: &mut dyn Painter) {
     let mut random = stream(12);
     let texel = |texel: &Texel| Texel { coverage: if texel.coverage < 128 { 0 } else { 255 }, ..*texel };
     let holed = holed_masks();
@@ -262,20 +265,24 @@ fn check_opaque_equivalence(mut create: impl FnMut(Scene) -> Box<dyn Evaluator>)
         let evaluation = (evaluator.evaluation(0).sae, evaluator.evaluation(0).marginal.to_vec());
         let layers = evaluator.read_back_layers(0).expect("the evaluator works");
         let canvas = Canvas::scaled(75, 50, 120);
-        (evaluation, layers, evaluator.draw(&population(&scene, &flies), &canvas, 2).expect("the evaluator works"))
+        (evaluation, layers, painter.draw(&population(&scene, &flies), &canvas, 2).expect("the painter works"))
     };
     assert_eq!(evaluate(Blend::Opaque), evaluate(Blend::Translucent));
 }
 
 #[test]
 fn on_the_cpu_translucent_tiles_of_all_or_nothing_equal_opaque_ones() {
-    check_opaque_equivalence(|scene| Box::new(CpuEvaluator::new(vec![scene])));
+    check_opaque_equivalence(|scene| Box::new(CpuEvaluator::new(vec![scene])), &mut CpuPainter);
 }
 
 #[test]
 fn on_vulkan_translucent_tiles_of_all_or_nothing_equal_opaque_ones() {
     canary::with_device(&DeviceOptions::default(), |device| {
-        check_opaque_equivalence(|scene| Box::new(GpuEvaluator::create(&device, vec![scene]).expect("it fits")));
+        let painter = &mut GpuPainter::create(&device).expect("the device works");
+        check_opaque_equivalence(
+            |scene| Box::new(GpuEvaluator::create(&device, vec![scene]).expect("it fits")),
+            painter,
+        );
     });
 }
 

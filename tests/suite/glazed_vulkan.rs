@@ -58,7 +58,7 @@ fn uneven(target: Target) -> Target {
 fn course(target: Target, fly_count: usize, change: impl FnOnce(&mut Rules)) -> Course {
     let side = tile_side(target.width_px(), target.height_px(), fly_count);
     let masks = translucent_masks(&mut stream(5));
-    let mut rules = Style::spray().rules(7, (side, fly_count), BACKGROUND, BACKGROUND);
+    let mut rules = Style::spray().rules(7, side, fly_count, BACKGROUND, BACKGROUND);
     (rules.mask_first, rules.mask_count) = (0, masks.layers().len() as u32);
     change(&mut rules);
     let guide = Arc::new(guide::sharp(&target));

@@ -1,9 +1,9 @@
 //! Grout, drawn: the ring of each tile, exactly, on the CPU and on Vulkan.
 
-use smalti::cpu::CpuEvaluator;
-use smalti::gpu::GpuEvaluator;
+use smalti::cpu::CpuPainter;
+use smalti::gpu::GpuPainter;
 use smalti::model::tables::cos_sin;
-use smalti::model::{Canvas, Evaluator, Fly, Grout, NO_FLY, Population};
+use smalti::model::{Canvas, Fly, Grout, NO_FLY, Painter, Population};
 use smalti::vk::DeviceOptions;
 
 use crate::canary;
@@ -24,8 +24,8 @@ fn grouted(Scenario { scene, flies, .. }: &Scenario, width: u32) -> Population {
     Population { grout: Some(Grout { width, color: COLOR }), ..population(scene, flies) }
 }
 
-fn draw(evaluator: &mut dyn Evaluator, population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<[u8; 3]> {
-    evaluator.draw(population, canvas, supersampling).expect("the evaluator works").pixels
+fn draw(painter: &mut dyn Painter, population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<[u8; 3]> {
+    painter.draw(population, canvas, supersampling).expect("the painter works").pixels
 }
 
 /// Whether a pixel that `fly` covers lies within `width` of one of its edges, from the genes alone.
@@ -56,7 +56,7 @@ fn at_evaluation_size_the_ring_of_the_top_tile_is_grout_and_all_else_is_as_witho
                 ring.iter().zip(&plain).map(|(&ring, &plain)| if ring { COLOR } else { plain }).collect();
             ring.iter().for_each(|&ring| sums[usize::from(ring)] += 1);
             let canvas = Canvas::evaluation(width_px, height_px);
-            let drawn = draw(&mut CpuEvaluator::new(vec![]), &grouted(&scenario, width), &canvas, 1);
+            let drawn = draw(&mut CpuPainter, &grouted(&scenario, width), &canvas, 1);
             assert!(drawn == expected, "{name}: grout of {width}");
         }
     }
@@ -68,15 +68,15 @@ fn grout_is_drawn_alike_on_the_cpu_and_on_vulkan_at_any_size_and_supersampling()
     canary::with_device(&DeviceOptions::default(), |device| {
         for scenario in opaque().filter(|scenario| scenario.flies.len() <= 300) {
             let (width_px, height_px) = (scenario.scene.target.width_px(), scenario.scene.target.height_px());
-            let mut vulkan = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
+            let mut vulkan = GpuPainter::create(&device).expect("the device works");
             // The last spans several patches of samples.
             let sizes = [(17, 1, 64), (150, 3, 7), (90, 2, 100_000), (2_200, 1, 33)];
             let count = if scenario.name == "masks with holes" { 4 } else { 2 };
             for (long_side_px, supersampling, width) in sizes.into_iter().take(count) {
                 let population = grouted(&scenario, width);
                 let canvas = Canvas::scaled(width_px, height_px, long_side_px);
-                let [twin, vulkan] = [&mut CpuEvaluator::new(vec![]) as &mut dyn Evaluator, &mut vulkan]
-                    .map(|evaluator| draw(evaluator, &population, &canvas, supersampling));
+                let [twin, vulkan] = [&mut CpuPainter as &mut dyn Painter, &mut vulkan]
+                    .map(|painter| draw(painter, &population, &canvas, supersampling));
                 assert!(twin == vulkan, "{} at {long_side_px} px with {supersampling}² samples", scenario.name);
             }
         }
@@ -91,7 +91,7 @@ fn a_ring_wider_than_half_a_tile_leaves_nothing_of_it_and_translucent_tiles_have
         let grout = Some(Grout { width, color: COLOR });
         let population =
             Population { width_px: 32, height_px: 32, grout, flies: vec![fly], ..population(&scenario.scene, &[]) };
-        draw(&mut CpuEvaluator::new(vec![]), &population, canvas, 1)
+        draw(&mut CpuPainter, &population, canvas, 1)
     };
     for (long_side_px, scale) in [(32, 1), (96, 9)] {
         let canvas = Canvas::scaled(32, 32, long_side_px);
@@ -105,17 +105,17 @@ fn a_ring_wider_than_half_a_tile_leaves_nothing_of_it_and_translucent_tiles_have
     let canvas = Canvas::evaluation(foggy.scene.target.width_px(), foggy.scene.target.height_px());
     let plain = population(&foggy.scene, &foggy.flies);
     for population in [&plain, &grouted(&foggy, 60)] {
-        let drawn = draw_on_vulkan_and_cpu(population, &foggy, &canvas);
+        let drawn = draw_on_vulkan_and_cpu(population, &canvas);
         assert!(drawn == Reference::new(&foggy.scene, &foggy.flies).colors());
     }
 }
 
 /// The picture that both draw.
-fn draw_on_vulkan_and_cpu(population: &Population, scenario: &Scenario, canvas: &Canvas) -> Vec<[u8; 3]> {
-    let twin = draw(&mut CpuEvaluator::new(vec![]), population, canvas, 1);
+fn draw_on_vulkan_and_cpu(population: &Population, canvas: &Canvas) -> Vec<[u8; 3]> {
+    let twin = draw(&mut CpuPainter, population, canvas, 1);
     canary::with_device(&DeviceOptions::default(), |device| {
-        let mut evaluator = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
-        assert!(draw(&mut evaluator, population, canvas, 1) == twin);
+        let mut painter = GpuPainter::create(&device).expect("the device works");
+        assert!(draw(&mut painter, population, canvas, 1) == twin);
     });
     twin
 }

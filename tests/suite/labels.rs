@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex};
 
 use smalti::evolve::evolution::random_population;
 use smalti::evolve::style::Style;
-use smalti::gpu::{GpuEvaluator, VulkanSearch};
+use smalti::gpu::{GpuEvaluator, GpuPainter, VulkanSearch};
 use smalti::guide;
 use smalti::model::cells::{Course, Search};
-use smalti::model::{Blend, Canvas, Evaluator, MaskSet, Population, Scene, Target};
+use smalti::model::{Blend, Canvas, Evaluator, MaskSet, Painter, Population, Scene, Target};
 use smalti::vk::{ClockMethod, Device, DeviceOptions, PassTime, Staging, Submission, SubmissionObserver, Timing};
 
 use crate::canary;
@@ -63,7 +63,8 @@ fn evaluate_and_draw(device: &Arc<Device>, masks: MaskSet) {
     evaluator.load(&[(0, &flies)]).expect("the device works");
     let (width_px, height_px) = (48, 40);
     let population = Population { width_px, height_px, background: [0; 3].into(), grout: None, masks, flies };
-    evaluator.draw(&population, &Canvas::evaluation(48, 40), 1).expect("the device works");
+    let mut painter = GpuPainter::create(device).expect("the device works");
+    painter.draw(&population, &Canvas::evaluation(48, 40), 1).expect("the device works");
     if population.masks.blend() == Blend::Opaque {
         evaluator.marginal_by_re_rendering().expect("the device works");
     }
@@ -73,7 +74,7 @@ fn search(device: &Arc<Device>, masks: MaskSet) {
     let target = target();
     let guide = Arc::new(guide::sharp(&target));
     let style = Style::named(if masks.blend() == Blend::Opaque { "free" } else { "spray" }).expect("it is a style");
-    let rules = style.rules(7, (400, 40), [0; 3], [0; 3]);
+    let rules = style.rules(7, 400, 40, [0; 3], [0; 3]);
     let course = Course { rules, target, guide, masks: Arc::new(masks), fly_count: 40 };
     let mut search = VulkanSearch::new(device, course).expect("it fits");
     search.advance(3).expect("the device works");

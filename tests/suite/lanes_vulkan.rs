@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use smalti::cpu::cells::CpuSearch;
-use smalti::engine::{Ended, Finished, SearchCrew};
-use smalti::evolve::StopReason;
-use smalti::evolve::cells::{self, Budget, Observer, ROUNDS_PER_EPOCH};
+use smalti::engine::{Crew, Finished, SearchTask, Task};
+use smalti::evolve::cells::{self, Budget, ROUNDS_PER_EPOCH};
+use smalti::evolve::{Ended, StopReason, Undisturbed};
 use smalti::gpu::{CellForm, CellShape, VulkanLanes};
 use smalti::model::Fly;
 use smalti::model::cells::rules::BirthKind;
@@ -147,7 +147,8 @@ fn lanes_wait_while_the_device_is_full_and_refuse_what_it_can_never_hold() {
     canary::with_device(&DeviceOptions::default(), |device| {
         assert_eq!(device.info().limits.storage_buffer_bytes, 128 << 20, "the sizes here are for this limit");
         let mut lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
-        // Lanes that are cut otherwise have buffers of their own; so wide, the steps of all are short enough for any subgroup.
+        // Lanes with cells of another shape have buffers of their own. At this width all steps are short enough for any
+        // subgroup.
         let shape = CellShape { lanes: 64, form: CellForm::Wide, ..narrow(&device) };
         let try_admit = |lanes: &mut VulkanLanes, course: &Course| lanes.admit_with_shape(course.clone(), None, shape);
         let first = try_admit(&mut lanes, &small(96)).expect("it fits").expect("there is room");
@@ -175,21 +176,15 @@ fn lanes_wait_while_the_device_is_full_and_refuse_what_it_can_never_hold() {
     });
 }
 
-/// Never ends anything.
-struct Nobody;
-
-impl Observer for Nobody {
-    fn after_epoch(&mut self, _: &mut dyn Search) -> smalti::Result<Option<StopReason>> {
-        Ok(None)
-    }
-}
-
 /// What a search comes to alone on the CPU.
 fn alone(course: &Course, first: Option<&[Fly]>, budget: &Budget) -> Ended {
     let mut search = CpuSearch::new(course.clone());
-    let stop = cells::run(&mut search, first, budget, &mut Nobody).expect("the twin works");
-    let sae = cells::sae(&mut search).expect("the twin works");
-    Ended { stop, standing: search.standing(), sae, state: search.read_back().expect("the twin works") }
+    let stop = cells::run(&mut search, first, budget, &mut Undisturbed).expect("the twin works");
+    Ended::of_search(&mut search, stop).expect("the twin works")
+}
+
+fn task(course: &Course, first: Option<&[Fly]>, budget: Budget) -> Task {
+    Task::Search(SearchTask { course: course.clone(), first: first.map(<[Fly]>::to_vec), budget })
 }
 
 /// Courses with budgets that end them for every reason, in the middle of an epoch and at its end.
@@ -216,15 +211,15 @@ fn a_crew_that_is_refilled_comes_to_what_each_search_comes_to_alone() {
     let mut found: Vec<Finished> = Vec::new();
     canary::with_device(&DeviceOptions::default(), |device| {
         let lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
-        let mut crew = SearchCrew::new(Box::new(lanes));
+        let mut crew = Crew::default().with_searches(Box::new(lanes));
         let mut waiting = (0_u64..).zip(&jobs);
         let too_large = course(star(64, 64), 480_001, |_| {});
         loop {
             while crew.len() < 5 {
                 let Some((ticket, (course, first, budget))) = waiting.next() else { break };
-                let admitted = crew.admit(ticket, course.clone(), (first.as_deref(), *budget));
+                let admitted = crew.admit(ticket, task(course, first.as_deref(), *budget));
                 assert!(admitted.expect("it fits"), "there is room for five");
-                assert!(crew.admit(99, too_large.clone(), (None, *budget)).is_err());
+                assert!(crew.admit(99, task(&too_large, None, *budget)).is_err());
             }
             if crew.is_empty() {
                 break;
@@ -238,13 +233,9 @@ fn a_crew_that_is_refilled_comes_to_what_each_search_comes_to_alone() {
         let (course, first, budget) = &jobs[ticket as usize];
         let expected = alone(course, first.as_deref(), budget);
         let ended = outcome.expect("no search fails");
-        assert_eq!(
-            (ended.stop, ended.standing, ended.sae),
-            (expected.stop, expected.standing, expected.sae),
-            "{ticket}"
-        );
-        assert!(ended.state == expected.state, "the flies of search {ticket} differ");
-        reasons.push(ended.stop);
+        assert_eq!(ended.ending, expected.ending, "{ticket}");
+        assert!(ended == expected, "the flies of search {ticket} differ");
+        reasons.push(ended.ending.stop);
     }
     for reason in [StopReason::Evals, StopReason::TargetSae, StopReason::Patience, StopReason::Dry] {
         assert!(reasons.contains(&reason), "no search ended by {reason:?}");
@@ -257,13 +248,15 @@ fn a_crew_that_is_cancelled_is_empty_and_takes_others() {
     let budget = Budget { evals: 10_000, target_sae: None, patience: None };
     canary::with_device(&DeviceOptions::default(), |device| {
         let lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
-        let mut crew = SearchCrew::new(Box::new(lanes));
+        let mut crew = Crew::default().with_searches(Box::new(lanes));
         for ticket in [7, 8] {
-            assert!(crew.admit(ticket, course.clone(), (None, budget)).expect("it fits"));
+            assert!(crew.admit(ticket, task(&course, None, budget)).expect("it fits"));
         }
         assert!(crew.step().expect("the device works").is_empty());
-        assert_eq!((crew.cancel_all(), crew.len()), (vec![7, 8], 0));
-        assert!(crew.admit(9, course.clone(), (None, budget)).expect("it fits"));
+        assert_eq!(crew.len(), 2);
+        crew.cancel_all();
+        assert!(crew.is_empty());
+        assert!(crew.admit(9, task(&course, None, budget)).expect("it fits"));
         let ended = loop {
             if let Some(Finished { ticket: 9, outcome }) = crew.step().expect("the device works").pop() {
                 break outcome.expect("it does not fail");

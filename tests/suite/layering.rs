@@ -1,16 +1,18 @@
 //! The layers of `src/`: who may import whom, and which modules may do what the others may not.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+
+use crate::sources::{Source, code, ends_of, is_word_char, source, sources};
 
 /// The modules of the crate, lowest level first. A module imports only modules of lower levels.
-const LEVELS: [&[&str]; 7] = [
+const LEVELS: [&[&str]; 8] = [
     &["error"],
     &["photo", "output", "model", "metrics", "plot"],
     &["archive", "evolve", "guide", "shapes", "cpu", "vk", "vector", "openraster"],
     &["gpu"],
     &["engine"],
-    &["app"],
+    &["studio"],
+    &["cli"],
     &["main"],
 ];
 
@@ -23,70 +25,15 @@ const RESERVED: [(&[&str], &[&str], &str); 4] = [
     (&["unsafe"], &["vk"], "only `vk` is unsafe; give it a safe function"),
     (
         &["println!", "eprintln!", "print!", "eprint!", "stdout", "stderr"],
-        &["app", "main"],
-        "only `app` prints; return a value or an error",
+        &["cli", "main"],
+        "only `cli` prints; return a value or an error",
     ),
-    (&["std::env", "env::"], &["app", "main"], "only `app` reads the environment; take an option"),
-    (&["Instant", "SystemTime"], &["app", "main"], "only `app` reads the clock; take a duration or a stop reason"),
+    (&["std::env", "env::"], &["cli", "main"], "only `cli` reads the environment; take an option"),
+    (&["Instant", "SystemTime"], &["cli", "main"], "only `cli` reads the clock; take a duration or a stop reason"),
 ];
 
 /// Longer than this and a file is two files.
 const LINES_MAX: usize = 450;
-
-struct Source {
-    /// Relative to the project, for messages.
-    path: PathBuf,
-    /// The module of the crate root that the file belongs to: `vk` for `src/vk/scope.rs`.
-    module: String,
-    /// How far the crate root is above the file's own module: 1 for `src/vk/mod.rs`, 2 for `src/vk/scope.rs`.
-    depth: usize,
-    text: String,
-}
-
-fn sources() -> Vec<Source> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut sources = Vec::new();
-    let mut folders = vec![root.join("src")];
-    while let Some(folder) = folders.pop() {
-        for entry in fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
-            let path = entry.expect("the folder can be read").path();
-            if path.is_dir() {
-                folders.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-                let path = path.strip_prefix(root).expect("sources lie in the project").to_owned();
-                sources.push(source(path, text));
-            }
-        }
-    }
-    sources.sort_by(|a, b| a.path.cmp(&b.path));
-    sources
-}
-
-fn source(path: PathBuf, text: String) -> Source {
-    let stems = path.iter().skip(1).map(|part| part.to_string_lossy().trim_end_matches(".rs").to_owned());
-    let modules: Vec<String> = stems.filter(|stem| stem != "mod").collect();
-    Source { module: modules[0].clone(), depth: modules.len(), path, text }
-}
-
-/// The code of a line, without its comment.
-fn code(line: &str) -> &str {
-    line.split("//").next().unwrap_or_default()
-}
-
-fn is_word_char(char: char) -> bool {
-    char.is_alphanumeric() || char == '_'
-}
-
-/// Byte positions after each `word` in `text`, where it is not a part of a longer word.
-fn ends_of<'a>(text: &'a str, word: &'a str) -> impl Iterator<Item = usize> + 'a {
-    text.match_indices(word).filter_map(move |(start, _)| {
-        let end = start + word.len();
-        let is_start = !text[..start].ends_with(is_word_char);
-        let is_end = !word.ends_with(is_word_char) || !text[end..].starts_with(is_word_char);
-        (is_start && is_end).then_some(end)
-    })
-}
 
 /// The names at the start of `tree`, what follows `crate::`: one, or each of `{a, b::c, d::{e, f}}`.
 fn first_names(tree: &str) -> Vec<String> {
@@ -128,7 +75,7 @@ fn imports(source: &Source) -> Vec<(usize, String)> {
 
 /// Lines that reach the crate root by `super::`, where [`imports`] would not see what they name.
 fn escapes(source: &Source) -> Vec<usize> {
-    let mut depth = source.depth;
+    let mut depth = source.modules.len();
     let mut escapes = Vec::new();
     for (line, text) in (1..).zip(source.text.lines().map(code)) {
         // A module of tests inside the file; clippy lets nothing follow it.
@@ -186,7 +133,7 @@ fn every_module_imports_only_modules_of_lower_levels() {
 }
 
 #[test]
-fn only_vk_is_unsafe_and_only_the_app_prints_or_reads_the_clock_or_the_environment() {
+fn only_vk_is_unsafe_and_only_the_command_line_prints_or_reads_the_clock_or_the_environment() {
     let mut complaints = Vec::new();
     for source in sources() {
         for (words, modules, why) in RESERVED {
@@ -203,15 +150,16 @@ fn only_vk_is_unsafe_and_only_the_app_prints_or_reads_the_clock_or_the_environme
 }
 
 #[test]
-fn only_the_app_names_flags() {
+fn only_the_command_line_names_flags() {
     let names_a_flag = |line: &str| {
         line.match_indices("--").any(|(at, _)| line[at + 2..].starts_with(|c: char| c.is_ascii_lowercase()))
     };
     let mut complaints = Vec::new();
-    for source in sources().into_iter().filter(|source| !["app", "main"].contains(&source.module.as_str())) {
+    for source in sources().into_iter().filter(|source| !["cli", "main"].contains(&source.module.as_str())) {
         for (line, text) in (1..).zip(source.text.lines().map(code)).filter(|(_, text)| names_a_flag(text)) {
             let path = source.path.display();
-            complaints.push(format!("{path}:{line} names a flag: `{}`; app/advice.rs adds the flags", text.trim()));
+            complaints
+                .push(format!("{path}:{line} names a flag: `{}`; cli/terminal/advice.rs adds the flags", text.trim()));
         }
     }
     assert_none(&complaints);
@@ -244,7 +192,14 @@ fn the_test_of_layers_sees_every_way_to_name_a_module() {
     assert_eq!(escapes(&file("mod tests {\n    use super::super::image;\n    use super::super::super::model;")), [3]);
 
     assert!(objection("vk", "error").is_none() && objection("vk", "vk").is_none() && objection("gpu", "vk").is_none());
-    for (from, to) in [("vk", "cpu"), ("model", "photo"), ("error", "model"), ("engine", "gpu"), ("engine", "app")] {
+    for (from, to) in [
+        ("vk", "cpu"),
+        ("model", "photo"),
+        ("error", "model"),
+        ("engine", "gpu"),
+        ("engine", "studio"),
+        ("studio", "cli"),
+    ] {
         assert!(objection(from, to).is_some(), "{from} may import {to}");
     }
 }

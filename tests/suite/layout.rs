@@ -4,10 +4,10 @@ use std::fs;
 use std::mem::offset_of;
 use std::path::Path;
 
-use smalti::gpu::cells_layout::{CellRecord, CellsPush, FlyRecord, SearchHeader, SearchRules};
+use smalti::gpu::cells::layout::{CellRecord, CellsPush, FlyRecord, SearchHeader, SearchRules, search_rules_numbers};
 use smalti::gpu::layout::{
-    ComposeItem, ComposePush, EvaluatePush, Instance, LaneRecord, MosaicPush, StackItem, Tile, TranslucentPush,
-    WorkItem,
+    ComposeItem, ComposePush, EvaluatePush, Instance, LaneRecord, MosaicPush, ReRenderPush, StackItem, Tile,
+    TranslucentPush, WorkItem,
 };
 
 use crate::shader_manifest::STAGES;
@@ -56,15 +56,27 @@ fn kind_of<T, F: Kind>(_field: impl Fn(&T) -> &F) -> String {
     F::GLSL.to_owned()
 }
 
-/// `Type = "Struct" in place of [stages] { field = "member", ... }`.
+/// The stages of a search.
+const CELLS: [&str; 8] = [
+    "cells.comp",
+    "cells_deal.comp",
+    "cells_depths.comp",
+    "cells_fitness.comp",
+    "cells_glazed.comp",
+    "cells_scan.comp",
+    "cells_scatter.comp",
+    "cells_sort.comp",
+];
+
+/// `Type = "Struct" in place of stages, { field = "member", ... }`.
 macro_rules! twin {
-    ($type:ident = $glsl:literal in $place:ident of [$($stage:literal),+] { $($field:ident = $member:literal),+ }) => {{
+    ($type:ident = $glsl:literal in $place:ident of $stages:expr, { $($field:ident = $member:literal),+ }) => {{
         // Names every field: one that the table misses does not compile.
         let _ = |$type { $($field: _),+ }: $type| ();
         Twin {
             rust: stringify!($type),
             glsl: $glsl,
-            stages: &[$($stage),+],
+            stages: &$stages,
             place: Place::$place,
             size_bytes: size_of::<$type>(),
             fields: vec![$(Member {
@@ -76,76 +88,74 @@ macro_rules! twin {
     }};
 }
 
+/// What the tables of the rules say.
+fn search_rules() -> Twin {
+    let field = |(name, offset, kind): (String, u32, &str)| Member { name, offset, kind: kind.to_owned() };
+    Twin {
+        rust: "SearchRules",
+        glsl: "SearchRules",
+        stages: &CELLS,
+        place: Place::Array,
+        size_bytes: size_of::<SearchRules>(),
+        fields: search_rules_numbers().into_iter().map(field).collect(),
+    }
+}
+
 fn twins() -> Vec<Twin> {
     vec![
-        twin!(Tile = "Tile" in Array of ["compose.comp", "evaluate.comp", "mosaic.frag", "translucent.comp"] {
+        twin!(Tile = "Tile" in Array of ["compose.comp", "evaluate.comp", "mosaic.frag", "re_render.comp", "translucent.comp"], {
             x0 = "x0", y0 = "y0", x1 = "x1", y1 = "y1", u0 = "u0", v0 = "v0", cos = "cos_step", sin = "sin_step",
             w = "w", h = "h", color = "color", mask = "mask", w_inverse = "w_inverse", h_inverse = "h_inverse",
             ring = "ring"
         }),
-        twin!(LaneRecord = "Lane" in Array of ["evaluate.comp", "translucent.comp"] {
+        twin!(LaneRecord = "Lane" in Array of ["evaluate.comp", "re_render.comp", "translucent.comp"], {
             first_fly = "first_fly", first_mask = "first_mask", background = "background", sum = "sum"
         }),
-        twin!(WorkItem = "WorkItem" in Array of ["evaluate.comp"] {
+        twin!(WorkItem = "WorkItem" in Array of ["evaluate.comp", "re_render.comp"], {
             lane = "lane", first_pixel = "first_pixel", x = "x", y = "y", first_entry = "first_entry",
             entry_count = "entry_count", flags = "flags", padding = "padding"
         }),
-        twin!(StackItem = "StackItem" in Array of ["translucent.comp"] {
+        twin!(StackItem = "StackItem" in Array of ["translucent.comp"], {
             lane = "lane", first_pixel = "first_pixel", x = "x", y = "y", first_entry = "first_entry",
             entry_count = "entry_count", first_slot = "first_slot", flags = "flags", first_rank = "first_rank",
             end_rank = "end_rank", scratch = "scratch", first_part = "first_part", error = "error"
         }),
-        twin!(ComposeItem = "ComposeItem" in Array of ["compose.comp"] {
+        twin!(ComposeItem = "ComposeItem" in Array of ["compose.comp"], {
             x = "x", y = "y", first_entry = "first_entry", entry_count = "entry_count", first_sample = "first_sample",
             flags = "flags"
         }),
-        twin!(Instance = "Instance" in Array of ["mosaic.vert"] {
+        twin!(Instance = "Instance" in Array of ["mosaic.vert"], {
             axis_u = "axis_u", axis_v = "axis_v", centre = "centre", fly = "fly", rank = "rank"
         }),
-        twin!(FlyRecord = "Fly" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        twin!(FlyRecord = "Fly" in Array of CELLS, {
             x = "x", y = "y", z = "z", rg = "rg", ba = "ba", w = "w", h = "h", form = "form"
         }),
-        twin!(SearchRules = "SearchRules" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
-            seed_low = "seed_low", seed_high = "seed_high", width = "width", height = "height", columns = "columns",
-            side_shift = "side_shift", fly_count = "fly_count", scratch_words = "scratch_words", side = "side",
-            candidates = "candidates", steps_per_fly = "steps_per_fly", deal_tournament = "deal_tournament",
-            highest = "highest", birth_q16 = "birth_q16", recolor_q16 = "recolor_q16", edge = "edge", turn = "turn",
-            shift = "shift", depth = "depth", mix_total = "mix_total", place_tournament = "place_tournament",
-            victim_tournament = "victim_tournament", side_low = "side_low", side_high = "side_high",
-            aspect_high = "aspect_high", is_stroke = "is_stroke", angle_spread = "angle_spread", coherence_range = "coherence_range",
-            side_min_q8 = "side_min_q8", side_max_q8 = "side_max_q8", aspect_max_q8 = "aspect_max_q8",
-            overlap = "overlap", turn_penalty = "turn_penalty", mask_first = "mask_first", mask_count = "mask_count",
-            depth_gap = "depth_gap", leash = "leash", grout = "grout", grout_color = "grout_color", guide_columns = "guide_columns", guide_rows = "guide_rows",
-            class_count = "class_count", end_0 = "end_0", end_1 = "end_1", end_2 = "end_2", scale_0 = "scale_0",
-            scale_1 = "scale_1", scale_2 = "scale_2", scale_3 = "scale_3", first_round_0 = "first_round_0",
-            first_round_1 = "first_round_1", first_round_2 = "first_round_2", first_round_3 = "first_round_3",
-            background = "background", lane = "lane", first_fly = "first_fly", first_deal = "first_deal",
-            first_cell = "first_cell", first_pixel = "first_pixel", first_stack = "first_stack",
-            first_scratch = "first_scratch", first_guide = "first_guide", first_mask = "first_mask",
-            first_origin = "first_origin"
-        }),
-        twin!(SearchHeader = "Header" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        search_rules(),
+        twin!(SearchHeader = "Header" in Array of CELLS, {
             round = "round", wanted = "wanted", pending = "pending", is_fresh = "is_fresh", overrun = "overrun",
             evals_low = "evals_low", evals_high = "evals_high", births_low = "births_low",
             births_high = "births_high", accepted_low = "accepted_low", accepted_high = "accepted_high",
             change_low = "change_low", change_high = "change_high", iterations = "iterations"
         }),
-        twin!(CellRecord = "CellRecord" in Array of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        twin!(CellRecord = "CellRecord" in Array of CELLS, {
             first = "first", count = "count", step = "step", dealt = "dealt", filled = "filled"
         }),
-        twin!(CellsPush = "Push" in PushConstants of ["cells.comp", "cells_deal.comp", "cells_depths.comp", "cells_fitness.comp", "cells_glazed.comp", "cells_scan.comp", "cells_scatter.comp", "cells_sort.comp"] {
+        twin!(CellsPush = "Push" in PushConstants of CELLS, {
             first_lane = "first_lane", budget = "budget"
         }),
-        twin!(EvaluatePush = "Push" in PushConstants of ["evaluate.comp"] {
-            item_count = "item_count", left_out_fly = "left_out_fly", sum_offset = "sum_offset"
+        twin!(EvaluatePush = "Push" in PushConstants of ["evaluate.comp"], {
+            item_count = "item_count"
         }),
-        twin!(TranslucentPush = "Push" in PushConstants of ["translucent.comp"] {
+        twin!(ReRenderPush = "Push" in PushConstants of ["re_render.comp"], {
+            item_count = "item_count", left_out_fly = "left_out_fly"
+        }),
+        twin!(TranslucentPush = "Push" in PushConstants of ["translucent.comp"], {
             first_item = "first_item", item_count = "item_count"
         }),
-        twin!(ComposePush = "Push" in PushConstants of ["compose.comp"] {
+        twin!(ComposePush = "Push" in PushConstants of ["compose.comp"], {
             item_count = "item_count", background = "background"
         }),
-        twin!(MosaicPush = "Push" in PushConstants of ["mosaic.vert", "mosaic.frag"] {
+        twin!(MosaicPush = "Push" in PushConstants of ["mosaic.vert", "mosaic.frag"], {
             origin = "origin", pixel_size = "pixel_size", first_mask = "first_mask", grout = "grout"
         }),
     ]

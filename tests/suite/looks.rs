@@ -24,8 +24,8 @@ fn every_mask_and_every_shader_gives_the_same_bytes_on_the_cpu_and_on_vulkan() {
             seen.insert(pixels.into_raw());
         }
     }
-    // Squares and borders are opaque everywhere, so that blending them at full opacity changes nothing; and soft, fade and
-    // wash are blended unless they are told not to be.
+    // Squares and borders are opaque everywhere, so blending them at full opacity changes nothing. Soft, fade and wash
+    // blend unless they are told not to.
     assert_eq!(seen.len(), masks.len() * 3 - 2 - 3);
 }
 

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use smalti::cpu::CpuEvaluator;
-use smalti::engine::{Engine, PaperCrew, PaperResult, PaperTask, Undisturbed};
-use smalti::evolve::{Evolution, Outcome, PaperScheme, StopReason, first_population};
+use smalti::engine::{Crew, Engine, Finished, PaperTask, Task};
+use smalti::evolve::{Ended, Evolution, PaperScheme, Undisturbed, first_population};
 use smalti::gpu::GpuEvaluator;
 use smalti::model::mask::{MASK_LAYERS_MAX, TEXELS, Texel};
 use smalti::model::{Change, Evaluator, Fly, Mask, MaskSet, Scene};
@@ -14,34 +14,11 @@ use smalti::vk::DeviceOptions;
 use crate::canary;
 use crate::scenarios::{any_fly, holed_masks, random_scene, stream, translucent_masks};
 
-/// All that a picture's evolution comes to.
-#[derive(Debug, PartialEq, Eq)]
-struct Told {
-    flies: Vec<Fly>,
-    marginal: Vec<i64>,
-    sae: u64,
-    outcome: Outcome,
-    stop: Option<StopReason>,
-}
-
-impl Told {
-    fn of(evolution: &Evolution, sae: u64, marginal: &[i64]) -> Self {
-        assert_eq!(evolution.best_sae(), Some(sae), "the result is what was scored");
-        Self {
-            flies: evolution.best_flies().to_vec(),
-            marginal: marginal.to_vec(),
-            sae,
-            outcome: evolution.outcome(),
-            stop: evolution.stop_reason(),
-        }
-    }
-}
-
 /// Width and height in px, flies, masks if not the square, and the scheme.
 type Kind<'a> = (u32, u32, usize, Option<&'a Arc<MaskSet>>, PaperScheme);
 
 /// Pictures of all kinds and sizes, and how each evolves; they end at different times.
-fn pictures() -> Vec<(Scene, PaperTask)> {
+fn pictures() -> Vec<PaperTask> {
     let mut random = stream(77);
     let holed = Arc::new(holed_masks());
     let foggy = Arc::new(translucent_masks(&mut random));
@@ -66,51 +43,48 @@ fn pictures() -> Vec<(Scene, PaperTask)> {
         let scene = Scene { masks, background, ..random_scene(width_px, height_px, fly_count, &mut random) };
         let scheme = PaperScheme { seed, ..scheme };
         let first_flies = first_population(&scheme, &scene.target, fly_count);
-        (scene, PaperTask { scheme, first_flies })
+        PaperTask { scene, scheme, first_flies }
     };
     (0..).zip(kinds).map(picture).collect()
 }
 
-fn alone(evaluator: Box<dyn Evaluator>, task: &PaperTask) -> Told {
+fn alone(evaluator: Box<dyn Evaluator>, task: &PaperTask) -> Ended {
     let target = Arc::clone(&evaluator.scene(0).target);
     let evolution =
         Evolution::new(task.scheme.clone(), 0, target.width_px(), target.height_px(), task.first_flies.clone());
     let mut engine = Engine::new(evaluator, vec![evolution]);
     engine.run(&mut Undisturbed).expect("the evaluator works");
-    let evaluation = engine.evaluator().evaluation(0);
-    let (sae, marginal) = (evaluation.sae, evaluation.marginal.to_vec());
-    Told::of(&engine.evolutions()[0], sae, &marginal)
+    engine.ended(0).expect("the result is what was scored")
 }
 
 /// Runs all pictures, at most `lanes_max` at a time, the next as soon as one has ended.
-fn by_crew(mut crew: PaperCrew, pictures: &[(Scene, PaperTask)], lanes_max: usize) -> BTreeMap<u64, Told> {
+fn by_crew(mut crew: Crew, pictures: &[PaperTask], lanes_max: usize) -> BTreeMap<u64, Ended> {
     let mut done = BTreeMap::new();
     let mut waiting = (0..).zip(pictures).peekable();
     while done.len() < pictures.len() {
         while crew.len() < lanes_max
-            && let Some((ticket, (scene, task))) = waiting.peek()
+            && let Some((ticket, task)) = waiting.peek()
         {
-            if !crew.admit(*ticket, scene, task).expect("the evaluator works") {
+            if !crew.admit(*ticket, Task::Paper((*task).clone())).expect("the evaluator works") {
                 break;
             }
             waiting.next();
         }
-        for PaperResult { ticket, evolution, sae, marginal } in crew.step().expect("the evaluator works") {
-            assert!(done.insert(ticket, Told::of(&evolution, sae, &marginal)).is_none(), "{ticket} ended twice");
+        for Finished { ticket, outcome } in crew.step().expect("the evaluator works") {
+            let ended = outcome.expect("the result is what was scored");
+            assert!(done.insert(ticket, ended).is_none(), "{ticket} ended twice");
         }
     }
-    assert!(crew.is_empty() && crew.evaluator().lane_count() == 0);
+    assert!(crew.is_empty());
     done
 }
 
 fn check_crew(mut create: impl FnMut(Vec<Scene>) -> Box<dyn Evaluator>) {
     let pictures = pictures();
-    let expected: BTreeMap<u64, Told> = (0..)
-        .zip(&pictures)
-        .map(|(ticket, (scene, task))| (ticket, alone(create(vec![scene.clone()]), task)))
-        .collect();
+    let expected: BTreeMap<u64, Ended> =
+        (0..).zip(&pictures).map(|(ticket, task)| (ticket, alone(create(vec![task.scene.clone()]), task))).collect();
     for lanes_max in [1, 3, pictures.len()] {
-        let together = by_crew(PaperCrew::new(create(Vec::new())), &pictures, lanes_max);
+        let together = by_crew(Crew::default().with_evolutions(create(Vec::new())), &pictures, lanes_max);
         assert_eq!(together, expected, "{lanes_max} lanes");
     }
 }
@@ -132,17 +106,17 @@ fn a_cancelled_crew_begins_anew_as_if_nothing_had_been() {
     canary::with_device(&DeviceOptions::default(), |device| {
         let pictures = pictures();
         let create = |scenes| Box::new(GpuEvaluator::create(&device, scenes).expect("it fits"));
-        let mut crew = PaperCrew::new(create(Vec::new()));
-        for (ticket, (scene, task)) in (100..).zip(&pictures[..4]) {
-            assert!(crew.admit(ticket, scene, task).expect("the evaluator works"));
+        let mut crew = Crew::default().with_evolutions(create(Vec::new()));
+        for (ticket, task) in (100..).zip(&pictures[..4]) {
+            assert!(crew.admit(ticket, Task::Paper(task.clone())).expect("the evaluator works"));
         }
         crew.step().expect("the evaluator works");
         assert!(!crew.is_empty(), "something is left to cancel");
         crew.cancel_all();
         assert!(crew.step().expect("the evaluator works").is_empty());
         let together = by_crew(crew, &pictures[..4], 2);
-        for (ticket, (scene, task)) in (0..).zip(&pictures[..4]) {
-            assert_eq!(together[&ticket], alone(create(vec![scene.clone()]), task));
+        for (ticket, task) in (0..).zip(&pictures[..4]) {
+            assert_eq!(together[&ticket], alone(create(vec![task.scene.clone()]), task));
         }
     });
 }

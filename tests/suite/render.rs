@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 use smalti::archive::{self, Archive};
-use smalti::cpu::CpuEvaluator;
-use smalti::model::{Canvas, Evaluator, Grout, Population};
+use smalti::cpu::CpuPainter;
+use smalti::model::{Canvas, Grout, Painter, Population};
 use smalti::photo;
 
 use crate::cli_refusals::refused;
@@ -106,7 +106,7 @@ fn the_grout_of_a_population_is_drawn_again_and_decides_what_may_be_replaced() {
     refused(&workshop, "render changed.npz -o a.png --output-size 90 --supersample 2", 2, "made with other options");
     let run = |line: &str| assert_eq!(workshop.run(line).code, Some(0), "{line}");
     run("render changed.npz -o b.png -o b.npz -o b.svg --output-size 90 --supersample 2");
-    let drawn = CpuEvaluator::new(vec![]).draw(&population, &Canvas::scaled(40, 30, 90), 2).unwrap();
+    let drawn = CpuPainter.draw(&population, &Canvas::scaled(40, 30, 90), 2).unwrap();
     assert_eq!(workshop.pixels("b.png").as_raw(), drawn.pixels.as_flattened());
     assert_ne!(workshop.pixels("b.png"), workshop.pixels("a.png"));
     assert_eq!(archive::read(&workshop.path("b.npz")).unwrap().population, population);

@@ -2,12 +2,15 @@
 
 use std::sync::Arc;
 
-use smalti::cpu::CpuEvaluator;
-use smalti::engine::{Engine, Observer, Undisturbed, side_by_side};
-use smalti::evolve::{ColorMode, ColorRule, Evolution, Palette, PaperScheme, StopReason, begin_from, first_population};
-use smalti::gpu::GpuEvaluator;
+use smalti::cpu::{CpuEvaluator, CpuPainter};
+use smalti::engine::{Engine, side_by_side};
+use smalti::evolve::{
+    ColorMode, ColorRule, Evolution, Observer, Palette, PaperScheme, Seen, StopReason, Undisturbed, begin_from,
+    first_population,
+};
+use smalti::gpu::{GpuEvaluator, GpuPainter};
 use smalti::model::operators::Rotation;
-use smalti::model::{Canvas, Evaluator, Fly, Population, Scene};
+use smalti::model::{Canvas, Evaluator, Fly, Painter, Population, Scene};
 use smalti::vk::DeviceOptions;
 
 use crate::canary;
@@ -66,7 +69,7 @@ fn schemes() -> Vec<(&'static str, PaperScheme)> {
 /// The best population, its SAE, and its spread's index.
 type Result = (Vec<Fly>, u64, Option<f64>);
 
-fn evolve(evaluator: Box<dyn Evaluator>, scheme: &PaperScheme) -> Result {
+fn evolve(evaluator: Box<dyn Evaluator>, painter: &mut dyn Painter, scheme: &PaperScheme) -> Result {
     let scene = evaluator.scene(0).clone();
     let (width_px, height_px) = (scene.target.width_px(), scene.target.height_px());
     let flies = first_population(scheme, &scene.target, scene.fly_count);
@@ -77,7 +80,7 @@ fn evolve(evaluator: Box<dyn Evaluator>, scheme: &PaperScheme) -> Result {
     let spread = evolution.spread().clark_evans;
     let (background, masks) = (scene.background.into(), (*scene.masks).clone());
     let population = Population { width_px, height_px, background, grout: None, masks, flies: flies.clone() };
-    let mosaic = engine.evaluator().draw(&population, &Canvas::evaluation(width_px, height_px), 1).expect("it draws");
+    let mosaic = painter.draw(&population, &Canvas::evaluation(width_px, height_px), 1).expect("it draws");
     let pairs = mosaic.pixels.as_flattened().iter().zip(scene.target.pixels().as_flattened());
     let drawn: u64 = pairs.map(|(&one, &other)| u64::from(one.abs_diff(other))).sum();
     assert_eq!((engine.evaluator().evaluation(0).sae, drawn), (sae, sae), "the result is what was scored");
@@ -85,7 +88,7 @@ fn evolve(evaluator: Box<dyn Evaluator>, scheme: &PaperScheme) -> Result {
 }
 
 fn on_cpu(scheme: &PaperScheme) -> Result {
-    evolve(Box::new(CpuEvaluator::new(vec![scene()])), scheme)
+    evolve(Box::new(CpuEvaluator::new(vec![scene()])), &mut CpuPainter, scheme)
 }
 
 #[test]
@@ -95,7 +98,8 @@ fn every_parameter_leads_to_the_same_population_on_both_evaluators() {
         for (name, scheme) in schemes() {
             let vulkan = GpuEvaluator::create(&device, vec![scene()]).expect("it fits");
             let result = on_cpu(&scheme);
-            assert_eq!(result, evolve(Box::new(vulkan), &scheme), "{name}");
+            let mut painter = GpuPainter::create(&device).expect("the device works");
+            assert_eq!(result, evolve(Box::new(vulkan), &mut painter, &scheme), "{name}");
             assert_ne!(result.0, usual.0, "{name} changes nothing");
         }
     });
@@ -173,12 +177,14 @@ impl Runs {
 }
 
 impl Observer for Runs {
-    fn at_start(&mut self, evolutions: &[Evolution]) {
-        self.look(&evolutions[0]);
+    fn at_start(&mut self, seen: &mut Seen<'_>) -> smalti::Result<()> {
+        self.after_epoch(seen).map(|_| ())
     }
-    fn after_generation(&mut self, evolutions: &[Evolution]) -> Option<StopReason> {
+
+    fn after_epoch(&mut self, seen: &mut Seen<'_>) -> smalti::Result<Option<StopReason>> {
+        let Seen::Evolutions(evolutions) = seen else { panic!("it is the paper's scheme") };
         self.look(&evolutions[0]);
-        None
+        Ok(None)
     }
 }
 

@@ -9,9 +9,9 @@ use crate::workshop::{Ran, Workshop};
 const FIELDS: [&str; 11] =
     ["MAE_R", "MAE_G", "MAE_B", "RMSE", "PSNR", "SSIM", "GMSM", "GMSD", "EDGE_P", "EDGE_R", "EDGE"];
 
-/// Per picture of [`paint_cases`] its SAE, and the other figures as numpy 2.4, scipy 1.17 and scikit-image 0.26 give them:
-/// `structural_similarity(channel_axis=2, data_range=255)`; `uniform_filter(luma, 2, mode="nearest")[::2, ::2]` and
-/// `prewitt(.., mode="nearest") / 3`; `canny(luma / 255, 1, 0.1, 0.2)` and `distance_transform_edt(..) <= 2`.
+/// For each picture of [`paint_cases`] its SAE, and the other figures as numpy 2.4, scipy 1.17 and scikit-image 0.26
+/// compute them: `structural_similarity(channel_axis=2, data_range=255)`; `uniform_filter(luma, 2, mode="nearest")[::2,
+/// ::2]` and `prewitt(.., mode="nearest") / 3`; `canny(luma / 255, 1, 0.1, 0.2)` and `distance_transform_edt(..) <= 2`.
 const GOLDEN: [(&str, u64, [f64; 11]); 6] = [
     (
         "quantised.png",

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use smalti::gpu::cells::layout::search_rules_glsl;
+
 use crate::shader_manifest::{Manifest, OPTIONS, STAGES, compiler_version, flattened_source, sha256};
 
 const RECOMPILE: &str = "run `cargo run --release --features shader-compiler --bin compile-shaders` and commit spirv/";
@@ -47,6 +49,12 @@ fn every_module_is_the_one_compiled_from_its_source_and_includes() {
             "spirv/{stage}.spv is not the module of spirv/MANIFEST; {RECOMPILE}"
         );
     }
+}
+
+#[test]
+fn the_rules_of_the_shaders_are_those_of_the_tables() {
+    let glsl = String::from_utf8(read("glsl/shared/cells_rules.glsl")).expect("the source is text");
+    assert_eq!(glsl, search_rules_glsl(), "the tables of the rules changed; {RECOMPILE}, and glsl/ with it");
 }
 
 #[test]

@@ -1,11 +1,12 @@
 //! Reads from a SPIR-V module how its structs lie in memory: the little that the layout test needs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// A struct that a shader reads from memory.
+/// A struct that a shader reads from memory, and that is not a member of another one.
 #[derive(Debug, Default)]
 pub struct MemoryStruct {
     pub name: String,
+    /// A member that is a struct or an array of a fixed length stands here as all that it is made of: `classes[1].end`.
     pub members: Vec<Member>,
     /// Distance of two elements in bytes, if the struct is the element of an array.
     pub array_stride: Option<u32>,
@@ -26,8 +27,10 @@ const OP_MEMBER_NAME: u32 = 6;
 const OP_TYPE_INT: u32 = 21;
 const OP_TYPE_FLOAT: u32 = 22;
 const OP_TYPE_VECTOR: u32 = 23;
+const OP_TYPE_ARRAY: u32 = 28;
 const OP_TYPE_RUNTIME_ARRAY: u32 = 29;
 const OP_TYPE_STRUCT: u32 = 30;
+const OP_CONSTANT: u32 = 43;
 const OP_DECORATE: u32 = 71;
 const OP_MEMBER_DECORATE: u32 = 72;
 const ARRAY_STRIDE: u32 = 6;
@@ -46,8 +49,12 @@ struct Ids {
     kinds: BTreeMap<u32, String>,
     /// Strides of arrays by the id of their element.
     element_strides: BTreeMap<u32, u32>,
+    /// Constants of 32 bits: lengths of arrays are among them.
+    constants: BTreeMap<u32, u32>,
+    /// Element and length of each array of a fixed length.
+    arrays: BTreeMap<u32, (u32, u32)>,
     /// Types of the members of each struct.
-    structs: Vec<(u32, Vec<u32>)>,
+    structs: BTreeMap<u32, Vec<u32>>,
 }
 
 /// The structs of a module whose members have offsets, in the module's order. A struct that a shader only keeps in
@@ -61,8 +68,10 @@ pub fn memory_structs(module: &[u8]) -> Vec<MemoryStruct> {
         ids.note(first & 0xFFFF, &operation[1..]);
         rest = after;
     }
-    let in_memory = ids.structs.iter().filter(|(id, _)| ids.offsets.contains_key(&(*id, 0)));
-    in_memory.map(|(id, types)| ids.memory_struct(*id, types)).collect()
+    let elements = ids.arrays.values().map(|(element, _)| element);
+    let inner: BTreeSet<&u32> = ids.structs.values().flatten().chain(elements).collect();
+    let in_memory = ids.structs.keys().filter(|id| ids.offsets.contains_key(&(**id, 0)) && !inner.contains(id));
+    in_memory.map(|id| ids.memory_struct(*id)).collect()
 }
 
 impl Ids {
@@ -94,13 +103,20 @@ impl Ids {
                 };
                 self.kinds.insert(*id, format!("{prefix}vec{count}"));
             }
+            (OP_CONSTANT, [_, id, value]) => {
+                self.constants.insert(*id, *value);
+            }
+            (OP_TYPE_ARRAY, [id, element, length]) => {
+                // A length by specialisation is no constant; such arrays are not in memory.
+                self.arrays.extend(self.constants.get(length).map(|length| (*id, (*element, *length))));
+            }
             (OP_TYPE_RUNTIME_ARRAY, [id, element]) => {
                 self.kinds.insert(*id, format!("{}[]", self.kind(*element)));
                 self.element_strides.extend(self.strides.get(id).map(|stride| (*element, *stride)));
             }
             (OP_TYPE_STRUCT, [id, types @ ..]) => {
                 self.kinds.insert(*id, self.names.get(id).cloned().unwrap_or_default());
-                self.structs.push((*id, types.to_vec()));
+                self.structs.insert(*id, types.to_vec());
             }
             _ => {}
         }
@@ -110,16 +126,30 @@ impl Ids {
         self.kinds.get(&id).cloned().unwrap_or_else(|| format!("type {id}"))
     }
 
-    fn memory_struct(&self, id: u32, types: &[u32]) -> MemoryStruct {
-        let member = |(place, kind): (u32, &u32)| Member {
-            name: self.member_names.get(&(id, place)).cloned().unwrap_or_default(),
-            offset: self.offsets[&(id, place)],
-            kind: self.kind(*kind),
-        };
-        MemoryStruct {
-            name: self.kind(id),
-            members: (0..).zip(types).map(member).collect(),
-            array_stride: self.element_strides.get(&id).copied(),
+    fn memory_struct(&self, id: u32) -> MemoryStruct {
+        let mut members = Vec::new();
+        self.list_members(id, (String::new(), 0), &mut members);
+        MemoryStruct { name: self.kind(id), members, array_stride: self.element_strides.get(&id).copied() }
+    }
+
+    /// Lists the members of a struct that lies at an offset under a path.
+    fn list_members(&self, id: u32, (path, start): (String, u32), members: &mut Vec<Member>) {
+        for (place, kind) in (0..).zip(&self.structs[&id]) {
+            let name = self.member_names.get(&(id, place)).map_or("", String::as_str);
+            self.list_member(*kind, (format!("{path}{name}"), start + self.offsets[&(id, place)]), members);
+        }
+    }
+
+    fn list_member(&self, kind: u32, (name, offset): (String, u32), members: &mut Vec<Member>) {
+        if let Some(&(element, length)) = self.arrays.get(&kind) {
+            for place in 0..length {
+                let at = offset + place * self.strides[&kind];
+                self.list_member(element, (format!("{name}[{place}]"), at), members);
+            }
+        } else if self.structs.contains_key(&kind) {
+            self.list_members(kind, (format!("{name}."), offset), members);
+        } else {
+            members.push(Member { name, offset, kind: self.kind(kind) });
         }
     }
 }

@@ -6,8 +6,8 @@ use image::codecs::gif::GifDecoder;
 use image::codecs::png::PngDecoder;
 use image::{AnimationDecoder, Frame, RgbImage};
 use smalti::archive;
-use smalti::cpu::CpuEvaluator;
-use smalti::model::{Canvas, Evaluator};
+use smalti::cpu::CpuPainter;
+use smalti::model::{Canvas, Painter};
 
 use crate::cli_interrupts::send;
 use crate::workshop::{Ran, Workshop};
@@ -31,7 +31,7 @@ fn timelapse(workshop: &Workshop, rest: &str) -> Ran {
 /// A snapshot as it should be drawn.
 fn drawing(workshop: &Workshop, name: &str, canvas: Canvas, supersampling: u32) -> RgbImage {
     let population = archive::read(&workshop.path(name)).unwrap().population;
-    let mosaic = CpuEvaluator::new(Vec::new()).draw(&population, &canvas, supersampling).unwrap();
+    let mosaic = CpuPainter.draw(&population, &canvas, supersampling).unwrap();
     RgbImage::from_raw(mosaic.width_px, mosaic.height_px, mosaic.pixels.concat()).unwrap()
 }
 

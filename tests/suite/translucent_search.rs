@@ -3,12 +3,12 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use smalti::cpu::CpuEvaluator;
+use smalti::cpu::CpuPainter;
 use smalti::cpu::cells::CpuSearch;
 use smalti::evolve::style::Style;
 use smalti::model::cells::rules::BirthDepth;
 use smalti::model::cells::{Course, Search, SearchState};
-use smalti::model::{Backdrop, Canvas, Evaluator, Fly, Population, Target};
+use smalti::model::{Backdrop, Canvas, Fly, Painter, Population, Target};
 use smalti::photo::{ReadOptions, read};
 
 use crate::scenarios::{stream, translucent_masks};
@@ -36,7 +36,7 @@ fn uneven(width_px: u32, height_px: u32) -> Target {
 fn course(target: Target, fly_count: usize) -> Course {
     let side = smalti::model::operators::tile_side(target.width_px(), target.height_px(), fly_count);
     let masks = translucent_masks(&mut stream(5));
-    let mut rules = Style::spray().rules(7, (side, fly_count), BACKGROUND, BACKGROUND);
+    let mut rules = Style::spray().rules(7, side, fly_count, BACKGROUND, BACKGROUND);
     rules.mask_first = 0;
     rules.mask_count = masks.layers().len() as u32;
     rules.steps_per_fly = 3;
@@ -57,10 +57,9 @@ fn drawn_objective(course: &Course, flies: &[Fly]) -> i64 {
         flies: flies.to_vec(),
     };
     let canvas = Canvas::evaluation(width_px, height_px);
-    let mut evaluator = CpuEvaluator::new(Vec::new());
-    let alone = evaluator.draw(&population, &canvas, 1).unwrap().alpha.unwrap();
+    let alone = CpuPainter.draw(&population, &canvas, 1).unwrap().alpha.unwrap();
     let over = Population { background: BACKGROUND.into(), ..population };
-    let shown = evaluator.draw(&over, &canvas, 1).unwrap().pixels;
+    let shown = CpuPainter.draw(&over, &canvas, 1).unwrap().pixels;
     (0..shown.len())
         .map(|place| {
             let weight = target.weights().map_or(1, |weights| i64::from(weights[place]));

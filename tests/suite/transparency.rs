@@ -6,9 +6,9 @@ use image::{Rgba, RgbaImage};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use smalti::archive::{self, Archive};
-use smalti::cpu::CpuEvaluator;
-use smalti::gpu::GpuEvaluator;
-use smalti::model::{Backdrop, Canvas, Evaluator, Grout, Mosaic, NO_FLY, Population};
+use smalti::cpu::CpuPainter;
+use smalti::gpu::GpuPainter;
+use smalti::model::{Backdrop, Canvas, Grout, Mosaic, NO_FLY, Painter, Population};
 use smalti::vk::DeviceOptions;
 
 use crate::canary;
@@ -33,7 +33,7 @@ fn transparent(Scenario { scene, flies, .. }: &Scenario) -> Population {
 }
 
 fn draw(population: &Population, canvas: &Canvas, supersampling: u32) -> Mosaic {
-    CpuEvaluator::new(vec![]).draw(population, canvas, supersampling).expect("the twin draws anything")
+    CpuPainter.draw(population, canvas, supersampling).expect("the twin draws anything")
 }
 
 #[test]
@@ -93,13 +93,13 @@ fn transparent_pictures_are_drawn_alike_on_the_cpu_and_on_vulkan_at_any_size_and
         let all = quick(scenarios().into_iter().chain(translucent_scenarios()));
         for scenario in all.filter(|scenario| scenario.flies.len() <= 300) {
             let (width_px, height_px) = size_px(&scenario);
-            let mut vulkan = GpuEvaluator::create(&device, vec![scenario.scene.clone()]).expect("it fits");
+            let mut vulkan = GpuPainter::create(&device).expect("the device works");
             let plain = transparent(&scenario);
             let grouted = Population { grout: Some(Grout { width: 20, color: [9; 3] }), ..plain.clone() };
             let own = width_px.max(height_px);
             for (population, long_side_px, supersampling) in [(&plain, own, 1), (&plain, 17, 2), (&grouted, 90, 3)] {
                 let canvas = Canvas::scaled(width_px, height_px, long_side_px);
-                let drawn = vulkan.draw(population, &canvas, supersampling).expect("the evaluator works");
+                let drawn = vulkan.draw(population, &canvas, supersampling).expect("the painter works");
                 let same = draw(population, &canvas, supersampling) == drawn;
                 assert!(same, "{} at {long_side_px} px with {supersampling}² samples", scenario.name);
             }

@@ -15,7 +15,7 @@ use crate::workshop::{Ran, Workshop};
 
 const SMALL: &str = "-n 120 --evals 12k -q";
 
-/// A workshop with `frames/`: a bright square over a picture that stands still, from the frame `cut` on over another one.
+/// A workshop with `frames/`: a bright square moves over a still picture, and from the frame `cut` on over another one.
 fn with_frames(count: usize, cut: usize) -> Workshop {
     let workshop = Workshop::new();
     std::fs::create_dir(workshop.path("frames")).unwrap();

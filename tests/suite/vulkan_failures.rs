@@ -1,5 +1,5 @@
-//! How raw Vulkan fails: mistakes in a recording, requests that do not fit, machines without Vulkan; and that the canary
-//! dies of what it watches for.
+//! How raw Vulkan fails: mistakes in a recording, requests that do not fit, machines without Vulkan. Also checks that
+//! the canary fails on the messages that it watches for.
 
 use std::process::Command;
 use std::sync::Arc;

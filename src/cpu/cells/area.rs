@@ -1,35 +1,31 @@
-//! The blocks of one cell while a task works on it, and what a child would do to their pixels.
+//! The blocks of one cell while a task works on it, and how a child would change their pixels.
 
 use multiversion::multiversion;
 
+use super::block::Block;
 pub(super) use super::block::SIDE;
-use super::block::{Block, PIXELS, Plane};
-use super::ground::Ground;
+use super::cover::{Cover, Lanes, outside, row_of};
+use super::pixels::Pixels;
 use crate::model::cells::color::median;
 use crate::model::cells::footprint::Footprint;
-use crate::model::cells::pixel::INSIDE;
-use crate::model::cells::suit::Suit;
-
-/// Eight pixels of a row.
-pub type Lanes = [i32; SIDE];
 
 /// The blocks of a cell, row by row.
 pub struct Area<'a, B> {
     blocks: Vec<&'a mut B>,
     /// Blocks along the width.
     columns: usize,
-    /// First column and row of blocks in the picture.
+    /// Column and row of the first block, counted in blocks of the picture.
     first: (i32, i32),
 }
 
-/// A child as far as its pixels go.
+/// What the pixels need to know of a child.
 #[derive(Clone, Copy, Debug)]
 pub struct Child<'a> {
     /// Where it is.
     pub footprint: &'a Footprint,
-    /// How deep.
+    /// Its depth.
     pub z: i32,
-    /// Its place in the population, which is its victim's.
+    /// Its index in the population, which is that of its victim.
     pub fly: u32,
     /// Cost of each pixel that it covers.
     pub overlap: i32,
@@ -40,7 +36,7 @@ pub struct Child<'a> {
 pub struct Shown {
     targets: Vec<u32>,
     channel: Vec<u8>,
-    /// What its other pixels, and what shows now, add to the change of the objective.
+    /// What all else adds to the change of the objective: the child's other pixels, and the errors of what shows now.
     rest: i64,
 }
 
@@ -50,7 +46,7 @@ impl Default for Shown {
     }
 }
 
-/// A part of a block's rows inside a footprint's box.
+/// The part of a block that lies inside the box of a footprint.
 pub(super) struct Rows {
     pub first: usize,
     pub last: usize,
@@ -59,7 +55,7 @@ pub(super) struct Rows {
     pub v: i32,
 }
 
-impl<'a, B: Ground> Area<'a, B> {
+impl<'a, B: Pixels> Area<'a, B> {
     /// The blocks of a cell whose first block is `first` in the picture.
     pub fn new(blocks: Vec<&'a mut B>, columns: usize, first: (i32, i32)) -> Self {
         Self { blocks, columns, first }
@@ -72,7 +68,7 @@ impl<'a, B: Ground> Area<'a, B> {
         (row as usize * self.columns + column as usize, ((y & 7) * 8 + (x & 7)) as usize)
     }
 
-    /// A block by its place.
+    /// The block with the index that [`Area::place`] returned.
     #[inline(always)]
     pub fn block(&self, place: usize) -> &B {
         self.blocks[place]
@@ -95,15 +91,15 @@ impl<'a, B: Ground> Area<'a, B> {
         }
     }
 
-    /// Whether some pixel's stack in the blocks of the box is full.
+    /// Whether any pixel in the blocks that the box touches has a full stack.
     pub fn is_full(&self, footprint: &Footprint) -> bool {
         let mut is_full = false;
         self.visit(footprint, |block, _| is_full |= block.full() > 0);
         is_full
     }
 
-    /// Calls `visit` for every pixel that one of two tiles covers, with its block, its place in it and in the picture, and whether each
-    /// of the two covers it.
+    /// Calls `visit` with the block of every pixel that one of two tiles covers, and with what [`Exchanged`] says about
+    /// the pixel.
     #[inline(always)]
     pub fn exchange(&mut self, one: &Cover<'_>, other: &Cover<'_>, mut visit: impl FnMut(&mut B, &Exchanged)) {
         self.exchange_rows(one, other, |block, (column, y), rows| {
@@ -118,8 +114,8 @@ impl<'a, B: Ground> Area<'a, B> {
         });
     }
 
-    /// Calls `visit` for every row of a block in the boxes of two tiles, with the block's column and the row in the picture, and which
-    /// of its eight pixels each of the two covers, as bits.
+    /// Calls `visit` for every row of every block that the boxes of two tiles touch. It gets the block's first column
+    /// and the row, both in the picture, and as bits which of the eight pixels each of the two tiles covers.
     #[inline(always)]
     pub fn exchange_rows(
         &mut self,
@@ -128,15 +124,15 @@ impl<'a, B: Ground> Area<'a, B> {
         mut visit: impl FnMut(&mut B, (i32, i32), [u32; 2]),
     ) {
         let (a, b) = (one.footprint, other.footprint);
-        // Apart by columns of blocks, so that no row is visited twice.
+        // Boxes in the same column of blocks count as one, so that no row is visited twice.
         let is_apart = a.x1 >> 3 < b.x0 >> 3 || b.x1 >> 3 < a.x0 >> 3 || a.y1 < b.y0 || b.y1 < a.y0;
         if a.is_empty() || b.is_empty() || is_apart {
-            self.exchange_rows_in(a, (one, &Cover::NONE), &mut visit);
-            self.exchange_rows_in(b, (&Cover::NONE, other), &mut visit);
+            self.exchange_rows_in(a, one, &Cover::NONE, &mut visit);
+            self.exchange_rows_in(b, &Cover::NONE, other, &mut visit);
         } else {
             let boxed =
                 Footprint { x0: a.x0.min(b.x0), y0: a.y0.min(b.y0), x1: a.x1.max(b.x1), y1: a.y1.max(b.y1), ..*a };
-            self.exchange_rows_in(&boxed, (one, other), &mut visit);
+            self.exchange_rows_in(&boxed, one, other, &mut visit);
         }
     }
 
@@ -144,7 +140,8 @@ impl<'a, B: Ground> Area<'a, B> {
     fn exchange_rows_in(
         &mut self,
         boxed: &Footprint,
-        (one, other): (&Cover<'_>, &Cover<'_>),
+        one: &Cover<'_>,
+        other: &Cover<'_>,
         visit: &mut impl FnMut(&mut B, (i32, i32), [u32; 2]),
     ) {
         if boxed.is_empty() {
@@ -169,7 +166,7 @@ impl<'a, B: Ground> Area<'a, B> {
 /// A pixel that one of two tiles covers.
 #[derive(Clone, Copy, Debug)]
 pub struct Exchanged {
-    /// Its place in its block.
+    /// Its index in its block.
     pub pixel: usize,
     /// Its column in the picture.
     pub x: i32,
@@ -181,62 +178,7 @@ pub struct Exchanged {
     pub is: bool,
 }
 
-/// A tile as far as the pixels that it covers go.
-#[derive(Clone, Copy, Debug)]
-pub struct Cover<'a> {
-    /// Its rectangle.
-    pub footprint: &'a Footprint,
-    /// What it wears; none if that cannot leave a hole and is not asked for.
-    pub suit: Option<&'a Suit<'a>>,
-}
-
-impl Cover<'_> {
-    /// Covers nothing.
-    pub const NONE: Self = Self { footprint: &Footprint::EMPTY, suit: None };
-
-    /// Which of the eight pixels of a block's row the tile covers, as bits.
-    #[inline(always)]
-    fn row_bits(&self, target: &Plane<u32>, (column, y): (i32, i32)) -> u32 {
-        let f = self.footprint;
-        if column < f.x0 >> 3 || column > f.x1 >> 3 || y < f.y0 || y > f.y1 {
-            return 0;
-        }
-        let (u, v) = f.coordinates(column * 8, y);
-        let out = outside(u, v, f);
-        let target = row_of(target, (y & 7) as usize);
-        let mut bits = 0;
-        for lane in 0..SIDE {
-            bits |= u32::from((out[lane] >= 0) & (target[lane] & INSIDE != 0)) << lane;
-        }
-        if let Some(suit) = self.suit {
-            for lane in 0..SIDE as i32 {
-                let is_hole = bits >> lane & 1 != 0
-                    && suit.look(f, (u + f.cos * lane) as u32, (v - f.sin * lane) as u32).is_none();
-                bits &= !(u32::from(is_hole) << lane);
-            }
-        }
-        bits
-    }
-}
-
-/// Negative where a lane's pixel lies outside the tile.
-#[inline(always)]
-fn outside(u: i32, v: i32, f: &Footprint) -> Lanes {
-    let mut out = [0; SIDE];
-    for (lane, out) in (0..).zip(&mut out) {
-        let (u, v) = (u.wrapping_add(f.cos.wrapping_mul(lane)), v.wrapping_sub(f.sin.wrapping_mul(lane)));
-        *out = u | (f.u_end - 1).wrapping_sub(u) | v | (f.v_end - 1).wrapping_sub(v);
-    }
-    out
-}
-
-/// The eight values of a row.
-#[inline(always)]
-pub(super) fn row_of<T: Copy>(plane: &[T; PIXELS], row: usize) -> &[T; SIDE] {
-    plane[row * SIDE..row * SIDE + SIDE].first_chunk().expect("a row has eight pixels")
-}
-
-/// Of each pixel of a row, whether the child covers it (all ones), whether it would show there, and the error of what
+/// For each pixel of a row: whether the child covers it (all ones), whether it would show there, and the error of what
 /// shows without its victim.
 #[inline(always)]
 pub(super) fn compare(block: &Block, row: usize, (u, v): (i32, i32), child: &Child<'_>) -> (Lanes, Lanes, Lanes) {
@@ -245,8 +187,8 @@ pub(super) fn compare(block: &Block, row: usize, (u, v): (i32, i32), child: &Chi
     let (top_z, under_z) = (row_of(&block.top.z, row), row_of(&block.under.z, row));
     let (top_error, under_error) = (row_of(&block.top.error, row), row_of(&block.under.error, row));
     let (mut covers, mut shows, mut errors) = ([0; SIDE], [0; SIDE], [0; SIDE]);
-    // Signs and masks instead of comparisons, which would not stay in a vector. All numbers are below 2^31, and `NO_FLY`
-    // is never asked for where it would matter: the background's depth alone decides.
+    // Signs and masks are used, since comparisons would not stay in a vector. All numbers are below 2^31, except
+    // `NO_FLY`, which makes no difference: where it stands, the background's depth alone decides.
     for lane in 0..SIDE {
         let apart = (top[lane] ^ child.fly) as i32;
         let is_other = (apart | apart.wrapping_neg()) >> 31;
@@ -262,7 +204,8 @@ pub(super) fn compare(block: &Block, row: usize, (u, v): (i32, i32), child: &Chi
     (covers, shows, errors)
 }
 
-/// The change of the objective when a child of this colour comes where its victim has gone, without the victim's part.
+/// The change of the objective when a child of this colour takes its victim's place, without what the victim's removal
+/// changes.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
 pub fn change(area: &Area<'_, Block>, child: &Child<'_>, color: u32) -> i64 {
     let mut sums = [0_i32; SIDE];
@@ -309,7 +252,7 @@ impl Shown {
         sums
     }
 
-    /// As [`change`], of the child that was collected.
+    /// As [`change`], for the child that was collected.
     pub fn change(&self, color: u32) -> i64 {
         self.rest + errors(&self.targets, color)
     }

@@ -1,4 +1,4 @@
-//! What the search keeps of 8x8 pixels: the target, what shows, and the stack of flies on each pixel.
+//! What the search stores for 8x8 pixels: the target, what shows, and the stack of flies on each pixel.
 
 use crate::model::NO_FLY;
 use crate::model::cells::pixel::{BACKGROUND_Z, STACK_DEPTH};
@@ -18,7 +18,7 @@ pub struct Layer {
     pub fly: Plane<u32>,
     /// Its depth, or [`BACKGROUND_Z`]; -1 outside the picture, where nothing is in front.
     pub z: Plane<i32>,
-    /// Its error; of the background with what the penalties make of it.
+    /// Its error; that of the background includes the penalties.
     pub error: Plane<i32>,
 }
 
@@ -81,8 +81,8 @@ impl Block {
         }
     }
 
-    /// Adds a fly to a pixel's stack, which must not be full; returns its place in it. `is_behind` tells of a fly whether it
-    /// lies behind the new one.
+    /// Adds a fly to a pixel's stack, which must not be full, and returns its place there. `is_behind` says whether a
+    /// fly lies behind the new one.
     #[inline(always)]
     pub fn insert(&mut self, pixel: usize, entry: Entry, is_behind: impl Fn(u32) -> bool) -> usize {
         let depth = usize::from(self.depth[pixel]);
@@ -98,7 +98,7 @@ impl Block {
         place
     }
 
-    /// Takes a fly out of a pixel's stack, where it must be; returns its place in it.
+    /// Removes a fly from a pixel's stack, where it must be, and returns the place it had.
     #[inline(always)]
     pub fn remove(&mut self, pixel: usize, fly: u32) -> usize {
         let depth = usize::from(self.depth[pixel]);
@@ -112,7 +112,7 @@ impl Block {
         place
     }
 
-    /// Changes the error of a fly that is on a pixel; returns its place there.
+    /// Changes the error of a fly that is on a pixel, and returns its place there.
     #[inline(always)]
     pub fn recolor(&mut self, pixel: usize, entry: Entry) -> usize {
         let place = self.place_of(pixel, entry.fly);
@@ -128,7 +128,7 @@ impl Block {
         place.unwrap_or(0)
     }
 
-    /// Sets the two layers of a pixel to what its stack says.
+    /// Sets the two layers of a pixel from its stack.
     #[inline(always)]
     pub fn surface(&mut self, pixel: usize, z_of: impl Fn(u32) -> i32) {
         let ground = Entry { fly: NO_FLY, error: self.ground[pixel] };

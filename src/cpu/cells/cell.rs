@@ -1,32 +1,21 @@
 //! The steady-state loop of one cell in one round: selection, mutation, evaluation, acceptance, removal.
+//! Twin: `glsl/shared/cells_loop.glsl`.
 
-use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
+use std::sync::atomic::Ordering;
 
-use super::area::{Area, Cover, Exchanged};
-use super::ground::{Ground, Paint, Piece, Swap};
+use super::area::{Area, Exchanged};
+use super::cover::Cover;
+use super::ground::{Coloring, Ground, Paint, Piece, Swap};
+use super::shared::Shared;
+use crate::model::cells::Course;
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::leash;
 use crate::model::cells::operators::{self, Setting, slot};
 use crate::model::cells::random::{Chain, below};
 use crate::model::cells::rules::{Acceptance, BirthKind, ColorSource, STEP_FIRST, grown, shrunk};
 use crate::model::cells::suit::Suit;
-use crate::model::cells::{Course, Grid};
 use crate::model::tile::{pack, unpack};
 use crate::model::{Fly, GuideSample};
-
-/// What all cells of a round share.
-pub struct Shared<'a> {
-    pub course: &'a Course,
-    pub grid: &'a Grid,
-    /// The cell of each fly in this round, or [`NO_CELL`] if it is frozen.
-    pub owners: &'a [u32],
-    /// Marginal fitness. That of a cell's own flies is written by the cell alone; to that of frozen flies all only add.
-    pub fitness: &'a [AtomicI64],
-    /// Depths; frozen ones do not change.
-    pub depths: &'a [AtomicU32],
-    /// Whether no tile is dressed and all pixels count the same.
-    pub is_plain: bool,
-}
 
 /// A fly of the cell.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +24,7 @@ pub struct Member {
     pub fly: Fly,
     /// Step size, u16.16.
     pub step: u32,
-    /// What its leash is tied to: the fly as it was loaded, or an absent one if it was born since.
+    /// Where its leash is tied: the fly as it was loaded, or an absent fly if it was born since then.
     pub origin: Fly,
 }
 
@@ -52,7 +41,7 @@ pub struct Done {
 /// A child that was evaluated.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
-    /// Place of its victim among the members.
+    /// Index of its victim among the members.
     victim: usize,
     fly: Fly,
     footprint: Footprint,
@@ -82,8 +71,8 @@ impl<'a, G: Ground> Cell<'a, G> {
         }
     }
 
-    /// Puts a fly where an absent one was, if there is room and some pixel for it: without one it would lie in no cell, and
-    /// no step could ever reach it.
+    /// Puts a fly where an absent one was, if it covers a pixel and the stacks have room. A fly that covers no pixel
+    /// would lie in no cell, so no step could ever reach it.
     pub fn place(&mut self, place: usize, fly: &Fly) {
         let footprint = Footprint::of(fly, (self.shared.grid.width_px, self.shared.grid.height_px));
         let child = Candidate { victim: place, fly: *fly, footprint, is_birth: true, change: 0 };
@@ -129,7 +118,7 @@ impl<'a, G: Ground> Cell<'a, G> {
         }
     }
 
-    /// Makes and evaluates one child; none if it is invalid.
+    /// Makes and evaluates one child; `None` if it is invalid.
     fn candidate(&mut self, place: usize, fitness: i64, draws: Chain) -> Option<Candidate> {
         let rules = &self.shared.course.rules;
         let kind = draws.bits(slot::KIND);
@@ -139,7 +128,7 @@ impl<'a, G: Ground> Cell<'a, G> {
         self.changed(place, kind & 0xFFFF, draws)
     }
 
-    /// What an operator needs for a fly, by its place among the members, at a place of this local size.
+    /// What an operator needs for the member at `place`, where the guide says `local`.
     fn setting(&self, place: usize, local: GuideSample) -> Setting<'_> {
         let rules = &self.shared.course.rules;
         Setting {
@@ -156,7 +145,7 @@ impl<'a, G: Ground> Cell<'a, G> {
 
     fn birth(&mut self, place: usize, fitness: i64, draws: Chain) -> Option<Candidate> {
         let rules = &self.shared.course.rules;
-        let victim = if fitness <= 0 { place } else { self.least_helpful(draws) };
+        let victim = if fitness <= 0 { place } else { self.victim(draws) };
         let child = match rules.births.kind {
             BirthKind::Fresh => {
                 let (x, y, shown_z) = self.worst_pixel(draws);
@@ -206,8 +195,8 @@ impl<'a, G: Ground> Cell<'a, G> {
         self.evaluate(place, child, paint)
     }
 
-    /// The least helpful of some random flies of the cell.
-    fn least_helpful(&self, draws: Chain) -> usize {
+    /// Who leaves for a new tile: the least helpful of some random flies of the cell.
+    fn victim(&self, draws: Chain) -> usize {
         let mut best = (i64::MAX, 0);
         for number in 0..self.shared.course.rules.births.victim_tournament {
             let place = draws.below(slot::VICTIM + number, self.members.len() as u32) as usize;
@@ -219,7 +208,7 @@ impl<'a, G: Ground> Cell<'a, G> {
         best.1
     }
 
-    /// The worst of some random pixels of the cell, and the depth of what shows there.
+    /// Column and row of the worst of some random pixels of the cell, and the depth of what shows there.
     fn worst_pixel(&self, draws: Chain) -> (u32, u32, u32) {
         let [x0, y0, x1, y1] = self.shared.grid.bounds(self.number);
         let mut worst = (-1, (x0, y0, 0));
@@ -235,7 +224,7 @@ impl<'a, G: Ground> Cell<'a, G> {
         worst.1
     }
 
-    /// The child within its bounds, with its colour, and the change that it would make.
+    /// Fits the child to its bounds, gives it its colour, and computes the change that it would make.
     fn evaluate(&mut self, victim: usize, child: Fly, paint: Paint) -> Option<Candidate> {
         let (shared, rules) = (self.shared, &self.shared.course.rules);
         let local = self.local(&child);
@@ -261,7 +250,7 @@ impl<'a, G: Ground> Cell<'a, G> {
         let own = G::without_victim(self.fitness(victim), turn_penalty(shared.course, &old))
             + operators::turn_penalty(&child, rules, local);
         let picked = if rules.color == ColorSource::Pick { self.picked(&child) } else { 0 };
-        let (color, change) = G::painted(&mut self.area, &mut self.desk, shared, &swap, (paint, picked))?;
+        let (color, change) = G::painted(&mut self.area, &mut self.desk, shared, &swap, Coloring { paint, picked })?;
         let child = if color == pack(child.color()) { child } else { child.with_color(unpack(color)) };
         if child == old {
             return None;
@@ -280,13 +269,13 @@ impl<'a, G: Ground> Cell<'a, G> {
         pack(target.pixels()[y as usize * target.width_px() as usize + x as usize])
     }
 
-    /// What a fly wears; none in a plain search.
+    /// What a fly wears; `None` in a plain search.
     fn suit(&self, fly: &Fly) -> Option<Suit<'a>> {
         let Course { masks, rules, .. } = self.shared.course;
         (!self.shared.is_plain && fly.alive).then(|| Suit::of(fly, masks, rules))
     }
 
-    /// Whether no pixel's stack would become too deep.
+    /// Whether every pixel's stack has room for the child.
     fn has_room(&mut self, child: &Candidate) -> bool {
         if !self.area.is_full(&child.footprint) {
             return true;
@@ -316,7 +305,7 @@ impl<'a, G: Ground> Cell<'a, G> {
         self.members[child.victim].fly = child.fly;
     }
 
-    /// Removes a fly that does not help; its marginal fitness becomes 0.
+    /// Removes a fly if it does not help; its marginal fitness becomes 0.
     fn remove_useless(&mut self, place: usize) {
         let Member { index, fly, .. } = self.members[place];
         if !fly.alive {

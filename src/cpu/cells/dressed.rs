@@ -1,4 +1,4 @@
-//! What a child would do to its pixels where tiles wear masks or grout, or pixels count differently: the general form of
+//! How a child would change its pixels if tiles wear masks or grout, or pixels differ in weight: the general form of
 //! `area`, pixel by pixel.
 
 use super::area::{Area, Child, SIDE, compare};
@@ -9,8 +9,8 @@ use crate::model::cells::pixel::{TRANSPARENT, difference};
 use crate::model::cells::suit::{Look, Suit, unshaded};
 use crate::model::mask::shaded;
 
-/// Calls `visit` for each pixel that the dressed child covers: what it shows there, target and weight, and what shows without its
-/// victim, if the child would be in front of it.
+/// Calls `visit` for each pixel that the dressed child covers, with what the child shows there, with the target and the
+/// weight, and, if the child would be in front, with the error of what shows without its victim.
 #[inline(always)]
 fn each_covered(
     area: &Area<'_, Block>,
@@ -42,8 +42,8 @@ fn each_covered(
 /// As [`super::area::change`].
 pub fn change(area: &Area<'_, Block>, child: &Child<'_>, suit: &Suit<'_>, color: u32) -> i64 {
     let mut sum = 0_i64;
-    each_covered(area, child, suit, |look, pixel, shown| {
-        let gain = shown.map_or(0, |shown| suit.error(look, color, pixel) - shown);
+    each_covered(area, child, suit, |look, (target, weight), shown| {
+        let gain = shown.map_or(0, |shown| suit.error(look, color, target, weight) - shown);
         sum += i64::from(gain + child.overlap);
     });
     sum
@@ -56,9 +56,9 @@ pub struct DressedShown {
     pixels: Vec<(u32, u8, u8)>,
     channels: [Vec<u8>; 3],
     weights: Vec<u8>,
-    /// What its other pixels, and what shows now, add to the change of the objective.
+    /// What all else adds to the change of the objective: the child's other pixels, and the errors of what shows now.
     rest: i64,
-    /// Whether it would show anything, be it grout.
+    /// Whether it would show anything, even if only grout.
     shows: bool,
 }
 
@@ -82,7 +82,7 @@ impl DressedShown {
                     let bright = unshaded(target, shade).to_le_bytes();
                     self.channels.iter_mut().zip(bright).for_each(|(channel, value)| channel.push(value));
                 }
-                _ => self.rest += i64::from(suit.error(look, 0, (target, weight))),
+                _ => self.rest += i64::from(suit.error(look, 0, target, weight)),
             }
         });
     }
@@ -116,7 +116,7 @@ impl DressedShown {
         )
     }
 
-    /// As [`change`], of the child that was collected.
+    /// As [`change`], for the child that was collected.
     pub fn change(&self, color: u32) -> i64 {
         let errors = self.pixels.iter().map(|&(target, shade, weight)| {
             i64::from(difference(target, shaded(color, u32::from(shade)))) * i64::from(weight)

@@ -1,18 +1,19 @@
-//! What an accepted child changes: the stacks of its victim's pixels and its own, and the marginal fitness of every fly that shows
-//! on them.
+//! What an accepted child changes: the stacks of its pixels and of its victim's, and the marginal fitness of the flies
+//! that show there.
 
 use std::sync::atomic::Ordering;
 
 use multiversion::multiversion;
 
-use super::area::{Area, Cover, Exchanged};
+use super::area::{Area, Exchanged};
 use super::block::{Block, Entry};
-use super::cell::Shared;
+use super::cover::Cover;
+use super::shared::Shared;
 use crate::model::NO_FLY;
 use crate::model::cells::NO_CELL;
 use crate::model::cells::pixel::difference;
 
-/// What the top fly of a pixel gains there.
+/// What the top fly of a pixel contributes to its marginal fitness there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Excess {
     fly: u32,
@@ -26,7 +27,7 @@ impl Excess {
         Self { fly: block.top.fly[pixel], gain }
     }
 
-    /// Takes this off its fly's fitness and adds another one to its own.
+    /// Subtracts this from the fitness of its fly, and adds `new` to the fitness of the fly on top now.
     #[inline(always)]
     fn replace(self, new: Self, shared: &Shared<'_>, cell: u32) {
         if self == new {
@@ -47,7 +48,7 @@ impl Excess {
     }
 }
 
-/// Adds to a fly's marginal fitness: plainly to one of the cell's own, atomically to a frozen one.
+/// Adds to a fly's marginal fitness: with a plain store if the fly is the cell's own, atomically if it is frozen.
 #[inline]
 pub fn add(shared: &Shared<'_>, cell: u32, fly: u32, amount: i64) {
     let fitness = &shared.fitness[fly as usize];
@@ -70,7 +71,7 @@ pub struct Exchange<'a> {
     pub keeps_color: bool,
 }
 
-/// Takes a fly off the pixels of one tile and puts it on those of another.
+/// Moves a fly from the pixels of its old tile to those of its new one.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
 pub fn exchange(area: &mut Area<'_, Block>, [old, new]: &[Cover<'_>; 2], change: &Exchange<'_>) {
     let Exchange { shared, cell, fly, color, keeps_depth, keeps_color } = *change;
@@ -81,7 +82,7 @@ pub fn exchange(area: &mut Area<'_, Block>, [old, new]: &[Cover<'_>; 2], change:
         let (target, weight) = (block.target[at.pixel], block.weight[at.pixel]);
         let Some(suit) = new.suit else { return difference(target, color) * weight };
         let (u, v) = new.footprint.coordinates(at.x, at.y);
-        suit.look(new.footprint, u as u32, v as u32).map_or(0, |look| suit.error(look, color, (target, weight)))
+        suit.look(new.footprint, u as u32, v as u32).map_or(0, |look| suit.error(look, color, target, weight))
     };
     let mut covered = 0;
     area.exchange(old, new, |block, at| {

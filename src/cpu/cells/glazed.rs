@@ -1,9 +1,10 @@
-//! What the search keeps of 8x8 pixels under translucent tiles: all layers, in rows of eight pixels that vectors work on.
+//! What the search stores for 8x8 pixels under translucent tiles: all layers, in rows of eight pixels for vectors to
+//! work on.
 
 #![allow(clippy::needless_range_loop, reason = "one index for several arrays of one length makes them vectors")]
 
-use super::area::row_of;
 use super::block::{PIXELS, Plane, SIDE};
+use super::cover::row_of;
 use crate::model::NO_FLY;
 use crate::model::cells::glaze::opacity_of;
 use crate::model::cells::pixel::{BACKGROUND_Z, TRANSLUCENT_DEPTH, TRANSPARENT, UNWANTED_ERROR};
@@ -23,6 +24,24 @@ struct Layer {
     look: Plane<u32>,
 }
 
+/// One tile on one pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Pane {
+    /// Its depth, or [`BACKGROUND_Z`].
+    pub z: u32,
+    /// Its fly, or [`NO_FLY`].
+    pub fly: u32,
+    /// See [`crate::model::cells::glaze::look`].
+    pub look: u32,
+}
+
+impl Layer {
+    #[inline(always)]
+    fn pane(&self, pixel: usize) -> Pane {
+        Pane { z: self.z[pixel], fly: self.fly[pixel], look: self.look[pixel] }
+    }
+}
+
 /// The state of 8x8 pixels under translucent tiles.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
@@ -40,21 +59,21 @@ pub struct Glazed {
     layers: [Layer; TRANSLUCENT_DEPTH],
 }
 
-/// A child over a row of pixels, where its victim has gone.
+/// A child over a row of pixels from which its victim was removed.
 #[derive(Clone, Copy, Debug)]
 pub struct Guest {
-    /// Its place in the population, which is its victim's.
+    /// Its index in the population, which is that of its victim.
     pub fly: u32,
-    /// How deep.
+    /// Its depth.
     pub z: u32,
-    /// Its opacity, 0 where it is not.
+    /// Its opacity at each pixel, 0 where it does not cover.
     pub opacity: Lanes,
 }
 
-/// A row of pixels, put together but for a guest's colour.
+/// A row of pixels, composited except for the guest's colour.
 #[derive(Clone, Copy, Debug)]
 pub struct Folded {
-    /// Sums of weighted channels of all else, with the background.
+    /// Sums of the weighted channels of everything else, background included.
     pub sums: [Lanes; 3],
     /// The guest's weight.
     pub weight: Lanes,
@@ -72,7 +91,7 @@ struct Open {
 impl Open {
     const START: Self = Self { left: [CLEAR; SIDE], sums: [[0; SIDE]; 3] };
 
-    /// Adds the next layer, where `mask` has all bits.
+    /// Adds the next layer at the pixels where `mask` has all bits set.
     #[inline(always)]
     fn add(&mut self, looks: &Lanes, mask: &Lanes) {
         for lane in 0..SIDE {
@@ -137,7 +156,7 @@ impl Glazed {
         self.layers[0].z[pixel]
     }
 
-    /// Takes over new depths, in the same order.
+    /// Sets new depths; their order must be the same as before.
     pub fn renumber(&mut self, depth_of: impl Fn(u32) -> u32) {
         for pixel in 0..PIXELS {
             for layer in &mut self.layers[..usize::from(self.depth[pixel])] {
@@ -146,48 +165,46 @@ impl Glazed {
         }
     }
 
-    /// Adds a tile to a pixel, whose stack must not be full.
-    pub fn insert(&mut self, pixel: usize, (z, fly): (u32, u32), look: u32) {
+    /// Adds a tile to a pixel whose stack is not full.
+    pub fn insert(&mut self, pixel: usize, pane: Pane) {
         let mut place = usize::from(self.depth[pixel]);
         self.depth[pixel] += 1;
         self.full += u32::from(place + 1 == TRANSLUCENT_DEPTH);
         while place > 0 {
-            let nearer = &self.layers[place - 1];
-            let word = (nearer.z[pixel], nearer.fly[pixel], nearer.look[pixel]);
-            if (word.0, word.1) < (z, fly) {
+            let nearer = self.layers[place - 1].pane(pixel);
+            if (nearer.z, nearer.fly) < (pane.z, pane.fly) {
                 break;
             }
-            self.set(place, pixel, word);
+            self.set(place, pixel, nearer);
             place -= 1;
         }
-        self.set(place, pixel, (z, fly, look));
+        self.set(place, pixel, pane);
     }
 
-    /// Takes a fly off a pixel, if it is there.
+    /// Removes a fly from a pixel, if it is there.
     pub fn remove(&mut self, pixel: usize, fly: u32) {
         let depth = usize::from(self.depth[pixel]);
         let Some(place) = self.layers[..depth].iter().position(|layer| layer.fly[pixel] == fly) else { return };
         for place in place..depth - 1 {
-            let behind = &self.layers[place + 1];
-            self.set(place, pixel, (behind.z[pixel], behind.fly[pixel], behind.look[pixel]));
+            self.set(place, pixel, self.layers[place + 1].pane(pixel));
         }
-        self.set(depth - 1, pixel, (BACKGROUND_Z, NO_FLY, 0));
+        self.set(depth - 1, pixel, Pane { z: BACKGROUND_Z, fly: NO_FLY, look: 0 });
         self.depth[pixel] -= 1;
         self.full -= u32::from(depth == TRANSLUCENT_DEPTH);
     }
 
-    fn set(&mut self, place: usize, pixel: usize, (z, fly, look): (u32, u32, u32)) {
+    fn set(&mut self, place: usize, pixel: usize, pane: Pane) {
         let layer = &mut self.layers[place];
-        (layer.z[pixel], layer.fly[pixel], layer.look[pixel]) = (z, fly, look);
+        (layer.z[pixel], layer.fly[pixel], layer.look[pixel]) = (pane.z, pane.fly, pane.look);
     }
 
-    /// Layers of the deepest pixel of a row.
+    /// Number of layers on the deepest pixel of a row.
     #[inline(always)]
     fn height(&self, row: usize) -> usize {
         usize::from(row_of(&self.depth, row).iter().copied().fold(0, u8::max))
     }
 
-    /// A row of pixels with a guest instead of its victim.
+    /// Composites a row of pixels with a guest instead of its victim.
     #[inline(always)]
     pub fn fold(&self, row: usize, guest: &Guest, background: u32) -> Folded {
         let mut open = Open::START;
@@ -198,7 +215,8 @@ impl Glazed {
             for lane in 0..SIDE {
                 let apart = (flies[lane] ^ guest.fly) as i32;
                 mask[lane] = ((apart | apart.wrapping_neg()) >> 31) as u32;
-                // In front if nearer, or as near and of a lower index; [`NO_FLY`] lies where the background's depth decides.
+                // The guest is in front if it is nearer, or equally near and of a lower index. Where [`NO_FLY`] stands,
+                // the background's depth decides.
                 let is_lower = (guest.fly as i32).wrapping_sub(flies[lane] as i32) >> 31;
                 let is_front = ((guest.z as i32 - zs[lane] as i32 + is_lower) >> 31) as u32;
                 let left = kept(open.left[lane], pending[lane] & is_front);
@@ -217,7 +235,7 @@ impl Glazed {
         Folded { sums: open.sums, weight, left: open.left }
     }
 
-    /// Computes the errors of a row anew.
+    /// Computes the errors of a row again.
     #[inline(always)]
     pub fn refresh_errors(&mut self, row: usize, background: u32) {
         let mut open = Open::START;
@@ -229,9 +247,11 @@ impl Glazed {
         self.error[row * SIDE..][..SIDE].copy_from_slice(&errors);
     }
 
-    /// Calls `visit` with the flies of one layer of a row, and by how much the error of each pixel rises without its fly.
+    /// Calls `visit` with the flies of one layer of a row, and by how much the error of each pixel rises without its
+    /// fly.
     ///
-    /// Exact: leaving out a layer starts from the state before it and adds the layers behind it again, as each rounds.
+    /// This is exact. Since every layer rounds, leaving one out starts from the state before it and adds the layers
+    /// behind it again.
     #[inline(always)]
     pub fn leave_out_each(&self, row: usize, background: u32, mut visit: impl FnMut(&Lanes, &[i32; SIDE])) {
         let height = self.height(row);

@@ -1,11 +1,12 @@
-//! A translucent child over its pixels and those of its victim: its best colour, and what it changes.
+//! A translucent child over its own pixels and those of its victim: its best colour, and the change that it makes.
 
 #![allow(clippy::needless_range_loop, reason = "one index for several arrays of one length makes them vectors")]
 
 use multiversion::multiversion;
 
-use super::area::{Area, Cover, row_of};
+use super::area::Area;
 use super::block::SIDE;
+use super::cover::{Cover, row_of};
 use super::glazed::{Folded, Glazed, Guest, Lanes, errors};
 use super::ground::Swap;
 use crate::model::cells::glaze::{Fit, lack_q6, share_q8};
@@ -17,12 +18,12 @@ use crate::model::translucency::opacity;
 #[derive(Debug, Default)]
 pub struct Laid {
     rows: Vec<Row>,
-    /// Their error as it is.
+    /// Their error before the change.
     before: i64,
     fit: Fit,
 }
 
-/// A row of pixels, put together but for the child's colour.
+/// A row of pixels, composited except for the child's colour.
 #[derive(Clone, Copy, Debug)]
 struct Row {
     folded: Folded,
@@ -33,12 +34,12 @@ struct Row {
 }
 
 impl Laid {
-    /// Puts a child's pixels together.
+    /// Composites the pixels of a child and of its victim.
     pub fn collect(&mut self, area: &mut Area<'_, Glazed>, swap: &Swap<'_>, background: u32) {
         collect(self, area, swap, background);
     }
 
-    /// The child's colour of least squares, packed; none if it shows nowhere.
+    /// The child's colour of least squares, packed; `None` if it shows nowhere.
     pub fn color(&self) -> Option<u32> {
         self.fit.color()
     }
@@ -74,7 +75,7 @@ fn collect(laid: &mut Laid, area: &mut Area<'_, Glazed>, swap: &Swap<'_>, backgr
     });
 }
 
-/// Opacity and shade of the new tile at eight pixels from `(x, y)` on, where `bits` says that its rectangle covers them.
+/// Opacity and shade of the new tile at eight pixels from `(x, y)` on; `bits` says which of them its rectangle covers.
 #[inline(always)]
 fn worn(swap: &Swap<'_>, (x, y): (i32, i32), bits: u32) -> (Lanes, Lanes) {
     let (mut opacities, mut shades) = ([0; SIDE], [0; SIDE]);
@@ -90,7 +91,7 @@ fn worn(swap: &Swap<'_>, (x, y): (i32, i32), bits: u32) -> (Lanes, Lanes) {
     (opacities, shades)
 }
 
-/// Adds what a row of pixels would like the colour to be.
+/// Adds what a row of pixels contributes to the best colour.
 #[inline(always)]
 fn fit(fit: &mut Fit, row: &Row) {
     let (mut lacks, mut squares) = ([0_i32; 3], 0_i32);

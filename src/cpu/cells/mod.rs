@@ -3,13 +3,16 @@
 mod area;
 mod block;
 mod cell;
+mod cover;
 mod dressed;
 mod exchange;
 mod glazed;
 mod ground;
 mod laid;
 mod opaque;
+mod pixels;
 mod search;
+mod shared;
 mod translucent;
 
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
@@ -20,8 +23,10 @@ pub use self::search::CpuSearch;
 
 use self::area::Area;
 use self::block::PIXELS;
-use self::cell::{Cell, Done, Member, Shared, turn_penalty};
-use self::ground::{Bare, Ground};
+use self::cell::{Cell, Done, Member, turn_penalty};
+use self::ground::Ground;
+use self::pixels::Bare;
+use self::shared::Shared;
 use crate::error::Result;
 use crate::model::Fly;
 use crate::model::blocks::{depth_order, index_of};
@@ -43,7 +48,7 @@ struct Cells<G> {
     columns: u32,
     flies: Vec<Fly>,
     steps: Vec<u32>,
-    /// What the leashes of flies are tied to, as [`Member::origin`].
+    /// For each fly, what [`Member::origin`] says.
     origins: Vec<Fly>,
     fitness: Vec<AtomicI64>,
     depths: Vec<AtomicU32>,
@@ -72,7 +77,7 @@ impl<G: Ground> Cells<G> {
         search
     }
 
-    /// Takes all flies away.
+    /// Removes all flies.
     fn clear(&mut self) {
         let Course { target, rules, .. } = &self.course;
         let (width, height) = (target.width_px(), target.height_px());
@@ -118,7 +123,7 @@ impl<G: Ground> Cells<G> {
         (self.course.target.width_px(), self.course.target.height_px())
     }
 
-    /// One round.
+    /// Makes one round.
     fn round(&mut self) {
         let grid = Grid::new(
             self.course.rules.seed,
@@ -172,7 +177,7 @@ impl<G: Ground> Cells<G> {
         self.refresh(&grid);
     }
 
-    /// Brings marginal fitness up to date where cells only estimate it.
+    /// Recomputes marginal fitness if cells only estimate it.
     fn refresh(&self, grid: &Grid) {
         let shared = Shared {
             course: &self.course,
@@ -185,7 +190,7 @@ impl<G: Ground> Cells<G> {
         G::refresh(&self.blocks, &self.flies, &shared);
     }
 
-    /// Gives every fly its cell.
+    /// Assigns every fly to its cell.
     fn deal(&mut self, grid: &Grid) -> Vec<Vec<Member>> {
         let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Deal);
         let mut members: Vec<Vec<Member>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
@@ -245,7 +250,7 @@ impl<G: Ground> Search for Cells<G> {
         let members = (0..).zip(flies).map(member).collect();
         let mut cell =
             Cell { shared: &shared, number: 0, area, members, desk: G::Desk::default(), done: Done::default() };
-        // Nearest first, so that it is the deepest flies that find no room.
+        // Nearest first, so that the deepest flies are the ones that find no room.
         for key in depth_order(flies) {
             let index = index_of(key) as usize;
             if flies[index].alive {
@@ -325,8 +330,8 @@ mod tests {
         Course { rules, target: Arc::new(target), guide, masks: Arc::new(MaskSet::default()), fly_count: 120 }
     }
 
-    /// How many of the flies that lived on after some rounds from one picture to another are on a leash of this length, and how many
-    /// of those are elsewhere than before; and how many are off it.
+    /// Of the flies that survive some rounds from one picture to another: how many are within `length` of where they
+    /// were, how many of these moved, and how many are farther away.
     fn on_and_off(leash: u32, length: u32) -> (usize, usize, usize) {
         let mut search = Cells::<Block>::new(course(0, 0));
         search.advance(8).expect("nothing fails");

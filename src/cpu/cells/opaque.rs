@@ -1,13 +1,17 @@
-//! Opaque tiles: what shows is the nearest one, and a child's change follows from the marginal fitness of its victim.
+//! Opaque tiles: the nearest one shows, so the change that a child makes follows from the marginal fitness of its
+//! victim.
 
 use std::sync::atomic::Ordering;
 
-use super::area::{self, Area, Child, Cover, Shown};
+use super::area::{self, Area, Child, Shown};
 use super::block::{Block, Plane};
-use super::cell::{Shared, turn_penalty};
+use super::cell::turn_penalty;
+use super::cover::Cover;
 use super::dressed::{self, DressedShown};
 use super::exchange::{Exchange, add, exchange};
-use super::ground::{Bare, Ground, Paint, Swap};
+use super::ground::{Coloring, Ground, Paint, Swap};
+use super::pixels::{Bare, Pixels};
+use super::shared::Shared;
 use crate::model::cells::color::mean;
 use crate::model::cells::pixel::{BACKGROUND_Z, STACK_DEPTH, TRANSPARENT};
 use crate::model::cells::rules::{ColorSource, Rules};
@@ -21,8 +25,7 @@ pub struct Desk {
     dressed: DressedShown,
 }
 
-impl Ground for Block {
-    type Desk = Desk;
+impl Pixels for Block {
     const DEPTH_MAX: usize = STACK_DEPTH;
 
     fn outside() -> Self {
@@ -76,6 +79,10 @@ impl Ground for Block {
             }
         }
     }
+}
+
+impl Ground for Block {
+    type Desk = Desk;
 
     #[inline]
     fn without_victim(fitness: i64, _: i64) -> i64 {
@@ -87,7 +94,7 @@ impl Ground for Block {
         desk: &mut Desk,
         shared: &Shared<'_>,
         swap: &Swap<'_>,
-        (paint, picked): (Paint, u32),
+        Coloring { paint, picked }: Coloring,
     ) -> Option<(u32, i64)> {
         let rules = &shared.course.rules;
         let child = Child {
@@ -143,7 +150,7 @@ impl Ground for Block {
             fly: index,
             color: pack(new.fly.color()),
             keeps_depth: old.fly.z == new.fly.z,
-            // The colour of a dressed tile at a pixel depends on its edges, too.
+            // Where a dressed tile shows its colour depends on its edges, too.
             keeps_color: shared.is_plain && old.fly.color() == new.fly.color(),
         };
         let covers = [old, new].map(|piece| Cover { footprint: piece.footprint, suit: piece.suit });

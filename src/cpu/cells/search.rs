@@ -1,4 +1,4 @@
-//! The search that others see, whatever its tiles are.
+//! The search as its users see it, for opaque and for translucent tiles.
 
 use super::Cells;
 use super::block::Block;

@@ -1,27 +1,30 @@
-//! Translucent tiles: every pixel shows all tiles on it, so a child's change is computed anew over its pixels and its victim's.
+//! Translucent tiles: a pixel shows all tiles on it, so the change that a child makes is computed from all layers of
+//! its pixels and of its victim's.
 //!
-//! Marginal fitness chooses victims, but decides no change. It is exact when a round begins; within one, only that of a fly that
-//! changes follows.
+//! Marginal fitness only helps to choose victims; no change is computed from it. It is exact when a round begins.
+//! During a round it is updated only for flies that change.
 
 use std::sync::atomic::Ordering;
 
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::area::{Area, Cover};
+use super::area::Area;
 use super::block::{PIXELS, Plane, SIDE};
-use super::cell::{Shared, turn_penalty};
-use super::glazed::Glazed;
-use super::ground::{Bare, Ground, Paint, Swap};
+use super::cell::turn_penalty;
+use super::cover::Cover;
+use super::glazed::{Glazed, Pane};
+use super::ground::{Coloring, Ground, Paint, Swap};
 use super::laid::Laid;
+use super::pixels::{Bare, Pixels};
+use super::shared::Shared;
 use crate::model::cells::glaze::look;
 use crate::model::cells::pixel::TRANSLUCENT_DEPTH;
 use crate::model::cells::rules::{ColorSource, Rules};
 use crate::model::tile::pack;
 use crate::model::{Fly, NO_FLY};
 
-impl Ground for Glazed {
-    type Desk = Laid;
+impl Pixels for Glazed {
     const DEPTH_MAX: usize = TRANSLUCENT_DEPTH;
 
     fn outside() -> Self {
@@ -65,6 +68,10 @@ impl Ground for Glazed {
     fn renumber(&mut self, depth_of: impl Fn(u32) -> u32) {
         self.renumber(depth_of);
     }
+}
+
+impl Ground for Glazed {
+    type Desk = Laid;
 
     fn without_victim(_: i64, penalty: i64) -> i64 {
         -penalty
@@ -75,7 +82,7 @@ impl Ground for Glazed {
         desk: &mut Laid,
         shared: &Shared<'_>,
         swap: &Swap<'_>,
-        (paint, picked): (Paint, u32),
+        Coloring { paint, picked }: Coloring,
     ) -> Option<(u32, i64)> {
         let rules = &shared.course.rules;
         let old_color = pack(swap.new.fly.color());
@@ -115,7 +122,7 @@ impl Ground for Glazed {
     }
 }
 
-/// Takes a fly off the pixels of one tile and puts it on those of another.
+/// Moves a fly from the pixels of its old tile to those of its new one.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
 fn exchange(area: &mut Area<'_, Glazed>, swap: &Swap<'_>, background: u32) {
     let color = pack(swap.new.fly.color());
@@ -134,14 +141,14 @@ fn exchange(area: &mut Area<'_, Glazed>, swap: &Swap<'_>, background: u32) {
             let Some(suit) = swap.new.suit.filter(|_| is >> lane & 1 != 0) else { continue };
             let texel = suit.texel_at(swap.new.footprint, (u, v), lane as i32);
             if texel.coverage > 0 {
-                block.insert(pixel, (swap.new.fly.z, swap.index), look(texel, color));
+                block.insert(pixel, Pane { z: swap.new.fly.z, fly: swap.index, look: look(texel, color) });
             }
         }
         block.refresh_errors(row, background);
     });
 }
 
-/// Adds to marginal fitness what a block's error would rise by without each of its flies.
+/// Adds to the marginal fitness of each fly by how much a block's error would rise without it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512dq+avx512vl", "x86_64+avx2+bmi1+bmi2", "aarch64+neon"))]
 fn add_rises(block: &Glazed, shared: &Shared<'_>) {
     for row in 0..PIXELS / SIDE {

@@ -3,7 +3,7 @@
 //! Twin: `glsl/shared/cells_color.glsl`.
 
 /// The lower median of one channel of packed colours: the smallest value `m` with more than `(count - 1) / 2` values at
-/// most `m`. Found bit by bit from above, which needs no order and no table.
+/// most `m`. It is found bit by bit from the highest bit down, so nothing has to be sorted or counted in a table.
 #[inline(always)]
 #[must_use]
 pub fn median(values: &[u8]) -> u8 {
@@ -11,7 +11,7 @@ pub fn median(values: &[u8]) -> u8 {
     let mut median = 0_u8;
     for bit in (0..8).rev() {
         let trial = median | 1 << bit;
-        // As many as `rank` + 1 values below the trial: the median is below it, too.
+        // If more than `rank` values are below the trial, so is the median.
         let mut below = 0_u32;
         for chunk in values.chunks(128) {
             let mut count = 0_u8;
@@ -27,8 +27,8 @@ pub fn median(values: &[u8]) -> u8 {
     median
 }
 
-/// As [`median`], of values that count as often as their weights say: the smallest value such that more than
-/// `(sum of weights - 1) / 2` of the weight lies at or below it.
+/// As [`median`], but each value counts as often as its weight says. It is the smallest value such that more than `(sum
+/// of weights - 1) / 2` of the weight lies at or below it.
 #[inline(always)]
 #[must_use]
 pub fn weighted_median(values: &[u8], weights: &[u8]) -> u8 {
@@ -46,7 +46,7 @@ pub fn weighted_median(values: &[u8], weights: &[u8]) -> u8 {
     median
 }
 
-/// The mean of values of this sum and number (or weight), rounded half up.
+/// The mean, rounded half up, of `count` values with this sum; `count` may be their total weight.
 #[inline]
 #[must_use]
 pub fn mean(sum: u32, count: u32) -> u8 {

@@ -1,11 +1,11 @@
-//! Depths spread evenly: births put tiles just in front of what shows, and would pile up there.
+//! Spreads depths evenly. Births put tiles just in front of what shows, so depths would pile up there.
 
 use crate::model::Fly;
 use crate::model::blocks::{depth_order, index_of};
 use crate::model::fly::Z_MAX;
 
-/// Spreads the depths of the flies that are not absent evenly over their range, in the same order, so that the picture stays
-/// as it is.
+/// Spreads the depths of the living flies evenly over the whole range. Their order stays the same, and so does the
+/// picture.
 pub fn spread(flies: &mut [Fly]) {
     let mut order = depth_order(flies);
     order.retain(|&key| flies[index_of(key) as usize].alive);

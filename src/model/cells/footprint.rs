@@ -1,11 +1,11 @@
-//! Which pixels a fly covers at evaluation size, as far as the search needs it: a [`crate::model::Tile`] without colour.
+//! Which pixels a fly covers at evaluation size: a [`crate::model::Tile`] reduced to what the search needs.
 //!
-//! Twin: `glsl/shared/cells_footprint.glsl`. The search bakes millions of children; this does without a division.
+//! Twin: `glsl/shared/cells_footprint.glsl`. The search bakes millions of children, so this uses no division.
 
 use crate::model::fly::{Fly, UNITS_PER_PX};
 use crate::model::tables::{TRIG_ONE, cos_sin};
 
-/// The clipped box and the affine map of a tile; coverage is that of [`crate::model::Tile`].
+/// The clipped box and the affine map of a tile. It covers the same pixels as the [`crate::model::Tile`] of the fly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Footprint {
     /// Left column of the box; the box is empty if `x0 > x1` or `y0 > y1`.
@@ -90,7 +90,7 @@ impl Footprint {
 /// Half of the tile's extent along one axis in 1/64 px, as [`crate::model::Tile::bake`] rounds it.
 #[inline]
 fn half_extent(along: i32, across: i32, w: u32, h: u32) -> i32 {
-    // Two products below 2^30 each: the sum needs the unsigned 32nd bit at most.
+    // Each product is below 2^30, so the sum fits 32 bits.
     let sum = along.unsigned_abs() * w + across.unsigned_abs() * h;
     ((sum >> 13) + (sum >> 23) + 2) as i32
 }

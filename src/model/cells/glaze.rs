@@ -1,14 +1,15 @@
-//! Translucent tiles in the search: what lies on a pixel, and the colour that serves a child best.
+//! Translucent tiles in the search: what lies on a pixel, and the best colour for a child.
 //!
-//! Twin: `glsl/shared/cells_glaze.glsl`. How layers add up is for [`crate::model::translucency`] to say. What a pixel shows is linear
-//! in the colour of one of its tiles, up to rounding: the sum of all else plus the tile's share times its colour. So the colour of
-//! least squares is a quotient of two sums, channel by channel.
+//! Twin: `glsl/shared/cells_glaze.glsl`. [`crate::model::translucency`] defines how layers add up. Up to rounding, what
+//! a pixel shows is linear in the colour of one of its tiles: it is the tile's share times its colour, plus the sum of
+//! everything else. So in each channel the colour of least squares is a quotient of two sums.
 
 use crate::model::mask::{Texel, shaded};
 use crate::model::tile::pack;
 use crate::model::translucency::{CLEAR, opacity};
 
-/// A tile at one pixel in one word: the colour under its shade, packed, and the coverage in the highest byte. 0 is no tile.
+/// One word for what a tile shows at a pixel: its shaded colour, packed, and its coverage in the highest byte. 0 is no
+/// tile.
 #[inline(always)]
 #[must_use]
 pub fn look(texel: Texel, color: u32) -> u32 {
@@ -22,7 +23,8 @@ pub const fn opacity_of(look: u32) -> u32 {
     opacity(look >> 24)
 }
 
-/// A tile's share of a pixel in 1/256, from its weight there, 0 to [`CLEAR`], and its shade: what a step of its colour shows.
+/// By how much the pixel changes, in 1/256, when the tile's colour changes by 1. It follows from the tile's weight
+/// there, 0 to [`CLEAR`], and from its shade.
 #[inline(always)]
 #[must_use]
 pub const fn share_q8(weight: u32, shade: u32) -> i32 {
@@ -30,8 +32,8 @@ pub const fn share_q8(weight: u32, shade: u32) -> i32 {
     ((weight * shade + 255 * CLEAR / 512) / (255 * CLEAR / 256)) as i32
 }
 
-/// What one channel of a target lacks when the tile shows black, with 6 fractional bits: between -2^14 and 2^14. `sum` are the
-/// weighted channels of all else, with those of the background.
+/// What one channel of the target lacks if the tile is black, with 6 fractional bits: between -2^14 and 2^14. `sum` is
+/// the sum of the weighted channels of everything else, background included.
 #[inline(always)]
 #[must_use]
 pub const fn lack_q6(target: u32, sum: u32) -> i32 {
@@ -40,8 +42,9 @@ pub const fn lack_q6(target: u32, sum: u32) -> i32 {
 
 /// Sums over the pixels that a tile covers, each times the pixel's weight.
 ///
-/// With weights of at most 16, a pixel adds at most 2^26 to `lacks`, so that eight rows of a block fit 32 bits in each of eight lanes,
-/// and 2^20 to `squares`; tiles of at most 2^20 pixels make at most 2^46 and 2^40 of them: two words on a device.
+/// With weights of at most 16, a pixel adds at most 2^26 to `lacks`, so eight rows of a block fit 32 bits in each of
+/// eight lanes. It adds at most 2^20 to `squares`. A tile has at most 2^20 pixels, which makes at most 2^46 and 2^40:
+/// two words on a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fit {
     /// Share times lack, by channel.
@@ -51,13 +54,14 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// The colour of least squares, packed; none if the tile shows nowhere.
+    /// The colour of least squares, packed; `None` if the tile shows nowhere.
     #[must_use]
     pub fn color(&self) -> Option<u32> {
         (self.squares > 0).then(|| pack([0, 1, 2].map(|channel| self.channel(channel))))
     }
 
-    /// `lacks / squares` in units of a channel, rounded half up and clamped to 8 bits. Bit by bit, which needs no division of 64 bits.
+    /// `lacks / squares` in units of a channel, rounded half up and clamped to 8 bits. It is found bit by bit, so no
+    /// 64-bit division is needed.
     fn channel(&self, channel: usize) -> u8 {
         let mut value = 0_u8;
         for bit in (0..8).rev() {

@@ -5,7 +5,7 @@
 use super::footprint::Footprint;
 use super::random::{Chain, Draw};
 
-/// Side of the squares of pixels that state is stored in and cells are aligned to.
+/// Side of the blocks of pixels in which state is stored, and to which cells are aligned.
 pub const BLOCK_SIDE_PX: u32 = 8;
 /// Smallest side of a cell.
 const CELL_SIDE_MIN_PX: u32 = 64;
@@ -34,15 +34,15 @@ pub struct Grid {
     pub rows: u32,
 }
 
-/// Side of a cell for tiles of the mean side `side` (1/64 px): the smallest power of two of at least 11 such sides and
-/// 64 px.
+/// Side of a cell for tiles of the mean side `side` (1/64 px): the smallest power of two that is at least 11 such sides
+/// and at least 64 px.
 #[must_use]
 pub fn cell_side_px(side: u32) -> u32 {
     (side * CELL_SIDE_TILES).div_ceil(super::super::fly::UNITS_PER_PX).next_power_of_two().max(CELL_SIDE_MIN_PX)
 }
 
 impl Grid {
-    /// The grid of a round. A cell larger than the picture holds all of it.
+    /// The grid of a round. If a cell is larger than the picture, one cell holds all of it.
     #[must_use]
     pub fn new(seed: u64, round: u32, (width_px, height_px): (u32, u32), side_px: u32) -> Self {
         let chain = Chain::new(seed, round, Draw::Grid);

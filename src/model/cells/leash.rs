@@ -1,17 +1,19 @@
-//! How far a tile may go from where it was when its population was loaded: between the frames of a sequence it may have a leash.
+//! The leash: how far a tile may move from where it was when its population was loaded. It keeps tiles in place from
+//! one frame of a sequence to the next.
 //!
-//! Twin: `glsl/shared/cells_leash.glsl`. A tile moves as far as that of its corners that moves farthest: its centre and the points of its
-//! edges lie between its corners.
+//! Twin: `glsl/shared/cells_leash.glsl`. A tile moves as far as its farthest-moving corner, since its centre and the
+//! points of its edges lie between its corners.
 
 use crate::model::Fly;
 use crate::model::fly::UNITS_PER_PX;
 use crate::model::tables::{TRIG_ONE, cos_sin};
 
-/// Longest leash in 1/64 px; with it and the sides that the search makes, what a corner moves fits 32 bits.
+/// Longest leash in 1/64 px; with it, and with the sides that the search makes, the movement of a corner fits 32 bits.
 pub const LEASH_MAX: u32 = 512 * UNITS_PER_PX;
 
-/// Whether no corner of `fly` lies farther than `leash`, in 1/64 px up to [`LEASH_MAX`], from where it was as that of `origin`. What a
-/// corner moves is rounded up along both axes, so that no leash is ever too long. An absent origin, or no leash (0), holds nothing back.
+/// Whether every corner of `fly` lies within `leash`, in 1/64 px up to [`LEASH_MAX`], of the same corner of `origin`.
+/// Movement is rounded up along both axes, so a corner never exceeds its leash. A fly with an absent origin or no leash
+/// (0) may be anywhere.
 #[must_use]
 pub fn holds(leash: u32, origin: &Fly, fly: &Fly) -> bool {
     if leash == 0 || !origin.alive {

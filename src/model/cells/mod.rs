@@ -1,8 +1,9 @@
-//! The `cells` search: a steady-state Fly algorithm in many cells side by side, in integers that the CPU twin and every
-//! device share.
+//! The `cells` search: a steady-state Fly algorithm in many cells side by side. It uses only integers, so the CPU twin
+//! and every device agree.
 //!
-//! What is decided here: which cell holds a fly ([`Grid`]), what children are like ([`operators`]), what their colours are
-//! ([`color`]) and what they cost ([`pixel`], [`Penalties`]). Who goes through the steps is for an evaluator to say.
+//! Here are the decisions: which cell holds a fly ([`Grid`]), what children are like ([`operators`]), which colours
+//! they take ([`color`]) and what they cost ([`pixel`], [`Penalties`]). The steps themselves are up to each
+//! implementation of [`Search`].
 
 pub mod color;
 pub mod depths;
@@ -10,6 +11,7 @@ pub mod footprint;
 pub mod glaze;
 pub mod grid;
 pub mod leash;
+pub mod numbers;
 pub mod operators;
 pub mod pixel;
 pub mod random;

@@ -1,7 +1,8 @@
 //! The operators of the cells search: how a child comes from its parent, or from nothing.
 //!
-//! Twin: `glsl/shared/cells_operators.glsl`. Each draws its numbers by slot, so that it can be tested alone. Children are
-//! within the bounds of the rules; whether they are within their cell and an improvement is for the step to say.
+//! Twin: `glsl/shared/cells_operators.glsl`. Each operator draws its numbers by slot, so it can be tested alone.
+//! Children are within the bounds of the rules. The step that asked for a child checks whether it lies in its cell and
+//! is an improvement.
 
 use super::random::{Chain, below};
 use super::rules::{ASPECT_FREE_Q8, BirthDepth, Bounds, Rules, SEARCH_SIDE_MAX, STEP_FIRST};
@@ -9,13 +10,13 @@ use crate::model::fly::{Fly, SIDE_MIN, Z_MAX, position_max};
 use crate::model::guide::GuideSample;
 use crate::model::tables::{cos_sin, normal_q8, size_factor_q16};
 
-/// Slots of a candidate's numbers.
+/// Slots of the random numbers of a candidate.
 pub mod slot {
-    /// Which kind of candidate: birth or change; then which operator.
+    /// Decides between birth and change, and which operator makes the change.
     pub const KIND: u32 = 0;
     /// Whether the child is recoloured.
     pub const RECOLOR: u32 = 1;
-    /// The numbers of the operator, nine.
+    /// The nine numbers of the operator.
     pub const OPERATOR: u32 = 2;
     /// Pixels that compete for the place of a birth.
     pub const PLACE: u32 = 16;
@@ -26,15 +27,15 @@ pub mod slot {
 /// Most competitors for a place.
 pub const PLACE_TOURNAMENT_MAX: u32 = slot::VICTIM - slot::PLACE;
 
-/// The mean side in the steps of moves; clamped so that step times bell-shaped number fits 32 bits: 138 px.
+/// Largest mean side that scales moves, 138 px: a step times a bell-shaped number then fits 32 bits.
 const MOVE_SIDE_MAX: u32 = 138 * 64;
 
-/// What an operator needs besides the fly.
+/// What an operator needs apart from the fly.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting<'a> {
     /// The rules.
     pub rules: &'a Rules,
-    /// The own side of the fly, or of the one to be born.
+    /// The own side ([`Rules::own_side`]) of the fly, or of the one to be born.
     pub own_side: u32,
     /// Size of the picture in px.
     pub size_px: (u32, u32),
@@ -79,7 +80,7 @@ pub fn bounded(fly: &Fly, bounds: &Bounds, own_side: u32) -> Fly {
     Fly { w: w.min(longest(h)), h: h.min(longest(w)), ..*fly }
 }
 
-/// One edge is moved along its normal; the opposite edge stays.
+/// Moves one edge along its normal; the opposite edge stays.
 #[must_use]
 pub fn edge_moved(fly: &Fly, setting: &Setting<'_>, step: u32, draws: Chain) -> Fly {
     let which = draws.bits(slot::OPERATOR) >> 30;
@@ -99,15 +100,15 @@ pub fn edge_moved(fly: &Fly, setting: &Setting<'_>, step: u32, draws: Chain) -> 
     setting.moved_to(&child, fly.x + ((by * along_x + 4096) >> 13), fly.y + ((by * along_y + 4096) >> 13))
 }
 
-/// The angle changes: by 90 degrees times the step size, bell-shaped.
+/// Changes the angle by a bell-shaped amount, with a standard deviation of 90 degrees times the step size.
 #[must_use]
 pub fn turned(fly: &Fly, step: u32, draws: Chain) -> Fly {
     let by = (step as i32 * bell_q8(draws, slot::OPERATOR) + 512) >> 10;
     Fly { angle: fly.angle.wrapping_add(by as u16), ..*fly }
 }
 
-/// Place, sides and angle change a little: half a mean side, a third in the logarithm of each side and 22 degrees, times the
-/// step size.
+/// Changes place, sides and angle a little. The standard deviations are half a mean side, a third in the logarithm of
+/// each side, and 22 degrees, all times the step size.
 #[must_use]
 pub fn shifted(fly: &Fly, setting: &Setting<'_>, step: u32, draws: Chain) -> Fly {
     let amplitude_q8 = move_q8(setting, step) / 2;
@@ -131,7 +132,7 @@ pub fn scaled(side: u32, steps: i32) -> u32 {
     ((u64::from(side) * size_factor_q16(steps) + (1 << 15)) >> 16) as u32
 }
 
-/// The depth changes: up or down by a bell-shaped part of the whole range.
+/// Changes the depth, up or down, by a bell-shaped part of the whole range.
 #[must_use]
 pub fn raised(fly: &Fly, step: u32, draws: Chain) -> Fly {
     // A standard deviation of 1/8 of the range, times the step size.
@@ -154,8 +155,8 @@ pub fn repainted(fly: &Fly, step: u32, draws: Chain) -> Fly {
     }
 }
 
-/// A new tile centred on a pixel: sides log-uniform around the mean side, turned as the guide says, in front of what
-/// shows there.
+/// A new tile centred on a pixel, in front of what shows there. Its sides are log-uniform around the own side, and its
+/// angle follows the guide.
 #[must_use]
 pub fn newborn(setting: &Setting<'_>, (x, y): (u32, u32), shown_z: u32, local: GuideSample, draws: Chain) -> Fly {
     let births = &setting.rules.births;
@@ -189,7 +190,7 @@ pub fn newborn(setting: &Setting<'_>, (x, y): (u32, u32), shown_z: u32, local: G
     }
 }
 
-/// A copy of a parent with a step in every gene: a birth as in the paper.
+/// A copy of a parent in which every gene makes a step: a birth as in the paper.
 #[must_use]
 pub fn mutant(parent: &Fly, setting: &Setting<'_>, draws: Chain) -> Fly {
     let step = STEP_FIRST;
@@ -198,8 +199,8 @@ pub fn mutant(parent: &Fly, setting: &Setting<'_>, draws: Chain) -> Fly {
     repainted(&child, step, draws)
 }
 
-/// What a tile costs for being turned away from the guide's direction: `turn` per pixel of its area at 45 degrees, by the
-/// square of the deviation modulo 90 degrees.
+/// What a tile costs for being turned away from the guide's direction. It grows with the square of the deviation modulo
+/// 90 degrees, up to `turn` per pixel of its area at 45 degrees.
 #[inline]
 #[must_use]
 pub fn turn_penalty(fly: &Fly, rules: &Rules, local: GuideSample) -> i64 {
@@ -207,8 +208,8 @@ pub fn turn_penalty(fly: &Fly, rules: &Rules, local: GuideSample) -> i64 {
         return 0;
     }
     let deviation = (i32::from(fly.angle.wrapping_sub(local.direction).wrapping_add(8_192) & 16_383) - 8_192) as u32;
-    // 0 to 256 at 45 degrees; the area in 1/16 px, one less for the largest of tiles so that the product fits 32 bits. With a
-    // penalty of at most `TURN_MAX` the result is below 2^30.
+    // `squared` goes from 0 to 256 at 45 degrees. `area` is in units of 1/16 px squared, and one less for the largest
+    // tiles so that the product fits 32 bits. With a penalty of at most `TURN_MAX` the result is below 2^30.
     let squared = deviation.wrapping_mul(deviation) >> 18;
     let area = ((fly.w >> 4) * (fly.h >> 4)).min((1 << 24) - 1);
     i64::from(((area * squared) >> 12) * rules.penalties.turn)

@@ -2,17 +2,17 @@
 //!
 //! Twin: `glsl/shared/cells_pixel.glsl`.
 
-/// Most flies that may lie on one pixel. A child that would stack deeper is refused, so that the stacks are always whole
-/// and no answer can be wrong.
+/// Most flies that may lie on one pixel. A child that would lie deeper is refused, so stacks are always complete and
+/// answers always exact.
 pub const STACK_DEPTH: usize = 16;
-/// As [`STACK_DEPTH`], of translucent tiles, which show through each other.
+/// As [`STACK_DEPTH`], for translucent tiles, which show through each other.
 pub const TRANSLUCENT_DEPTH: usize = 24;
 /// Depth of the background: behind every fly.
 pub const BACKGROUND_Z: u32 = 1 << 24;
 
-/// Highest byte of a target word: the pixel lies inside the picture.
+/// Flag in the highest byte of a target word: the pixel lies inside the picture.
 pub const INSIDE: u32 = 1 << 24;
-/// Highest byte of a target word: no tile is wanted at this pixel.
+/// Flag in the highest byte of a target word: no tile is wanted at this pixel.
 pub const TRANSPARENT: u32 = 1 << 25;
 /// The error of any tile at a pixel where none is wanted.
 pub const UNWANTED_ERROR: i32 = 765;

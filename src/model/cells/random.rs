@@ -1,21 +1,21 @@
-//! Random numbers of the cells search: a hash chain of (seed, round), cell, step, candidate and slot.
+//! Random numbers of the cells search: a chain of hashes over (seed, round), cell, step, candidate and slot.
 //!
 //! Twin: `glsl/shared/cells_random.glsl`. A step may need dozens of numbers on a device, where a hash of two
 //! multiplications is far cheaper than Philox; each number still depends on its name alone.
 
-/// What the numbers of one round are for; the chains of different purposes share no number but by chance.
+/// What the numbers of one round are for. Chains of different purposes share numbers only by chance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Draw {
     /// The grid's offset.
     Grid = 1,
-    /// Which cell an absent fly is dealt to; then its index.
+    /// Which cell an absent fly is dealt to; the next link is the fly's index.
     Deal = 2,
-    /// The steps of a cell; then its number, the step, the candidate.
+    /// The steps of a cell; the next links are its number, the step and the candidate.
     Step = 3,
 }
 
-/// A place in the chain: numbers are drawn from it by slot, or it leads on to the next link.
+/// A link of the chain: numbers are drawn from it by slot, or it leads on to the next link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chain(u32);
 

@@ -1,4 +1,4 @@
-//! What a search answers, whoever computes it: the CPU twin or a device.
+//! The interface of a search, whether the CPU twin or a device computes it.
 
 use std::sync::Arc;
 
@@ -22,7 +22,8 @@ pub struct Course {
 }
 
 impl Course {
-    /// Whether all tiles are squares of one colour without grout, and all pixels count the same: evaluators have a faster way for that.
+    /// Whether all tiles are plain squares without grout and all pixels have the same weight. Evaluators are faster
+    /// then.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         !self.is_translucent()
@@ -34,8 +35,8 @@ impl Course {
 }
 
 impl Course {
-    /// Whether the masks' coverage is opacity: then pixels show all tiles on them, nearest first ([`crate::model::translucency`]), tiles
-    /// have no grout, and the only penalty is that for turning.
+    /// Whether the masks' coverage is opacity. Then a pixel shows all tiles on it ([`crate::model::translucency`]),
+    /// tiles have no grout, and only turning is penalised.
     #[must_use]
     pub fn is_translucent(&self) -> bool {
         self.masks.blend() == Blend::Translucent
@@ -53,11 +54,11 @@ pub struct Standing {
     pub births: u64,
     /// Children accepted in all.
     pub accepted: u64,
-    /// What the search lowers: the error, weighed as the target says, and all penalties.
+    /// What the search minimises: the error, weighted by the target's weights, plus all penalties.
     pub objective: i64,
 }
 
-/// The population as a search leaves it.
+/// The population of a search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SearchState {
     /// The flies.
@@ -68,21 +69,21 @@ pub struct SearchState {
     pub fitness: Vec<i64>,
 }
 
-/// The flies on every pixel, nearest first, and their errors or, if they are translucent, their looks (`model::cells::glaze`); pixels
-/// row by row.
+/// The flies on every pixel, nearest first, with their errors or, if they are translucent, their looks
+/// (`model::cells::glaze`).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stacks {
-    /// Per pixel, (fly, error or look) of each fly on it.
+    /// (fly, error or look) of each fly on a pixel; pixels row by row.
     pub pixels: Vec<Vec<(u32, i32)>>,
 }
 
-/// Searches one picture, round by round. Every implementation comes to the same state after every round.
+/// Searches one picture, round by round. Every implementation reaches the same state after every round.
 pub trait Search: Send {
     /// What stays the same.
     fn course(&self) -> &Course;
 
-    /// Replaces the population, and begins to count anew. Flies that would stack deeper on a pixel than the search keeps track
-    /// of become absent, and so do those that the bounds of their sides would take off their leash.
+    /// Replaces the population and resets all counts. A fly becomes absent if it would lie deeper on a pixel than the
+    /// search keeps track of, or if fitting its sides to the bounds would move it beyond its leash.
     ///
     /// # Errors
     /// If the device fails.
@@ -100,7 +101,7 @@ pub trait Search: Send {
     /// If the device fails.
     fn renormalise(&mut self) -> Result<()>;
 
-    /// How far it has come.
+    /// How far the search has come.
     fn standing(&self) -> Standing;
 
     /// The population.
@@ -116,19 +117,20 @@ pub trait Search: Send {
     fn read_back_stacks(&mut self) -> Result<Stacks>;
 }
 
-/// Searches several pictures side by side on one device. A lane is one search; what it comes to never depends on the others.
+/// Searches several pictures side by side on one device. A lane is one search; its result never depends on the others.
 ///
 /// # Panics
-/// All methods that name a lane may, if it was not admitted or was dismissed.
+/// Methods that name a lane may panic if it was never admitted, or was dismissed.
 pub trait SearchLanes: Send {
-    /// Takes in a search, which begins with the flies of `first` or, without, with absent ones; returns its lane. None: there is no room
-    /// until others are dismissed.
+    /// Adds a search and returns its lane. The search begins with the flies of `first`, or with absent flies without
+    /// it. Returns `None` if there is no room until another lane is dismissed.
     ///
     /// # Errors
-    /// If the search alone is too large for the device, which concerns no other lane; or if the device fails.
+    /// If the search is too large for the device even alone, which leaves the other lanes as they are; or if the device
+    /// fails.
     fn admit(&mut self, course: Course, first: Option<&[Fly]>) -> Result<Option<usize>>;
 
-    /// Lets a search go; its lane may be another one's next.
+    /// Removes a search; its lane may go to the next one.
     fn dismiss(&mut self, lane: usize);
 
     /// What stays the same in a lane.
@@ -143,7 +145,7 @@ pub trait SearchLanes: Send {
     /// If the device fails.
     fn load(&mut self, lane: usize, flies: &[Fly]) -> Result<()>;
 
-    /// Asks for so many rounds more.
+    /// Asks for `rounds` more rounds.
     ///
     /// # Errors
     /// If the device fails.
@@ -152,17 +154,18 @@ pub trait SearchLanes: Send {
     /// Whether a lane has rounds to make.
     fn is_busy(&self, lane: usize) -> bool;
 
-    /// Makes one submission for all lanes that have rounds to make: until about one of them is done, and no longer than the clock may
-    /// wait.
+    /// Makes one submission for all lanes that have rounds to make. It ends about when the first of them is done, and
+    /// sooner if it would keep the caller from its clock for too long.
     ///
     /// # Errors
     /// If the device fails, which ends all lanes.
     fn work(&mut self) -> Result<()>;
 
-    /// Why a lane will make no more rounds, if it failed; told once. It is not busy then.
+    /// Why a lane failed, if it did. A failed lane is not busy and makes no more rounds; its error is returned only
+    /// once.
     fn failure(&mut self, lane: usize) -> Option<Error>;
 
-    /// As [`Search::renormalise`], of lanes that are not busy.
+    /// As [`Search::renormalise`], for lanes that are not busy.
     ///
     /// # Errors
     /// If the device fails.
@@ -181,11 +184,11 @@ pub trait SearchLanes: Send {
     fn read_back_stacks(&mut self, lane: usize) -> Result<Stacks>;
 }
 
-/// One lane as a search of its own. While it makes rounds, the others make those that they were asked for.
+/// One lane as a search of its own. While it makes rounds, the other lanes make theirs.
 pub struct OneLane<'a> {
     /// All lanes.
     pub lanes: &'a mut dyn SearchLanes,
-    /// The one.
+    /// The lane that this search is.
     pub lane: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What a tile wears: its mask, its shades and its ring of grout, and what that makes of its error at a pixel.
+//! What a tile wears (its mask, shades and ring of grout), and how that changes its error at a pixel.
 //!
 //! Twin: `glsl/shared/cells_suit.glsl`. The rules are those of [`crate::model::Tile`].
 
@@ -10,12 +10,12 @@ use crate::model::mask::{Blend, COVERAGE_THRESHOLD, MASK_SIDE, MaskSet, TEXELS, 
 use crate::model::tables::TRIG_ONE;
 use crate::model::tile::{inverse, quotient};
 
-/// The dress of one fly.
+/// What one fly wears.
 #[derive(Clone, Copy, Debug)]
 pub struct Suit<'a> {
-    /// Its mask's texels; none is the full square.
+    /// The texels of its mask; `None` is the full square.
     texels: Option<&'a [Texel; TEXELS]>,
-    /// Coverage from which a texel is no hole.
+    /// Coverage from which on a texel belongs to the tile.
     threshold: u8,
     /// Sides in 1/64 px and their inverses.
     w: u32,
@@ -58,7 +58,7 @@ impl<'a> Suit<'a> {
         }
     }
 
-    /// Its texel at tile coordinates inside its rectangle; elsewhere any texel.
+    /// The texel at tile coordinates inside the tile's rectangle. Outside it the result means nothing.
     #[inline(always)]
     #[must_use]
     pub fn texel(&self, u: u32, v: u32) -> Texel {
@@ -69,7 +69,7 @@ impl<'a> Suit<'a> {
         texels[row.wrapping_mul(MASK_SIDE as u32).wrapping_add(column) as usize % TEXELS]
     }
 
-    /// Its texel so many pixels to the right of tile coordinates.
+    /// The texel `right_px` pixels to the right of tile coordinates.
     #[inline(always)]
     #[must_use]
     pub fn texel_at(&self, footprint: &Footprint, (u, v): (i32, i32), right_px: i32) -> Texel {
@@ -77,7 +77,7 @@ impl<'a> Suit<'a> {
         self.texel(u.wrapping_add(by(footprint.cos)) as u32, v.wrapping_sub(by(footprint.sin)) as u32)
     }
 
-    /// What the tile shows at tile coordinates inside its rectangle; none in a hole of its mask.
+    /// What the tile shows at tile coordinates inside its rectangle; `None` in a hole of its mask.
     #[inline(always)]
     #[must_use]
     pub fn look(&self, footprint: &Footprint, u: u32, v: u32) -> Option<Look> {
@@ -94,7 +94,7 @@ impl<'a> Suit<'a> {
     /// The error of a tile of this colour at a pixel, times the pixel's weight.
     #[inline(always)]
     #[must_use]
-    pub fn error(&self, look: Look, color: u32, (target, weight): (u32, i32)) -> i32 {
+    pub fn error(&self, look: Look, color: u32, target: u32, weight: i32) -> i32 {
         if target & TRANSPARENT != 0 {
             return UNWANTED_ERROR * weight;
         }
@@ -106,7 +106,7 @@ impl<'a> Suit<'a> {
     }
 }
 
-/// The colour that would show `target` under `shade`, as near as it can: each channel over the shade, at most 255.
+/// The colour that comes nearest to `target` under `shade`: each channel divided by the shade, at most 255.
 #[inline]
 #[must_use]
 pub fn unshaded(target: u32, shade: u32) -> u32 {

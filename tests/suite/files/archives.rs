@@ -288,7 +288,11 @@ fn a_column_of_another_type_or_length_is_named() {
         ),
         ("h.npy", npy("<f4", "(500,)", &zeros[..100]), "its column `h` is broken or cut short"),
         ("h.npy", b"nothing like an array".to_vec(), "its `h` is not an array of numpy"),
-        ("h.npy", npy("<f4", "(2000000,)", &zeros), "its column `h` has 2000000 values, more than the 1000000 flies"),
+        (
+            "h.npy",
+            npy("<f4", "(2000000,)", &zeros),
+            "its column `h` has 2000000 values, more than the limit of 1000000 flies",
+        ),
         ("mask_1.npy", npy("|u1", "(2, 2, 2)", &zeros[..8]), "its `mask_1` is not 256x256x2 in C order"),
         ("mask_0.npy", npy("|u1", "(256, 256, 2)", &[0; 256 * 256 * 2]), "its `mask_0` is not the full square"),
     ];
@@ -336,7 +340,7 @@ fn a_meta_file_that_describes_no_population_is_refused() {
 fn members_that_swell_when_unpacked_are_not_unpacked_to_their_end() {
     for name in ["x.npy", "mask_1.npy", "meta.json"] {
         let message = refusal_with(name, vec![0; 64 << 20]);
-        assert!(message.contains(&format!("its `{name}` has more than ")), "{message}");
+        assert!(message.contains(&format!("its `{name}` is larger than the limit of ")), "{message}");
     }
 }
 

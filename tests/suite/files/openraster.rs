@@ -3,8 +3,8 @@
 use std::io::{Cursor, Read};
 
 use image::{RgbImage, RgbaImage};
-use smalti::cpu::CpuEvaluator;
-use smalti::model::{Canvas, Evaluator, Fly, Grout, MaskSet, Mosaic, Population};
+use smalti::cpu::CpuPainter;
+use smalti::model::{Canvas, Fly, Grout, MaskSet, Mosaic, Painter, Population};
 use smalti::openraster::{self, Layers};
 use smalti::photo::{self, Format, Photo};
 use zip::ZipArchive;
@@ -52,15 +52,14 @@ fn composed(ora: &[u8]) -> RgbImage {
 }
 
 fn merged(population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<u8> {
-    let drawn = CpuEvaluator::new(vec![]).draw(population, canvas, supersampling);
+    let drawn = CpuPainter.draw(population, canvas, supersampling);
     let Mosaic { width_px, height_px, pixels, alpha } = drawn.expect("the twin draws anything");
     let (photo, told) = (Photo { width_px, height_px, pixels }, vec![("smalti".to_owned(), "{}".to_owned())]);
     photo::encode_with_alpha(Format::Png, &photo, alpha.as_deref(), &told).unwrap()
 }
 
 fn encoded(population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<u8> {
-    let mut evaluator = CpuEvaluator::new(vec![]);
-    let layers = Layers::draw(&mut evaluator, population, canvas, supersampling, 8).expect("the twin draws anything");
+    let layers = Layers::draw(&mut CpuPainter, population, canvas, supersampling, 8).expect("the twin draws anything");
     openraster::encode(&layers, &merged(population, canvas, supersampling)).unwrap()
 }
 

@@ -5,9 +5,9 @@ use std::ops::Range;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use serde_json::{Map, json};
-use smalti::cpu::CpuEvaluator;
+use smalti::cpu::CpuPainter;
 use smalti::model::mask::{MASK_SIDE, Texel};
-use smalti::model::{Blend, Canvas, Evaluator, Fly, Grout, Mask, MaskSet, Mosaic, Population, Rgb, Scene};
+use smalti::model::{Blend, Canvas, Fly, Grout, Mask, MaskSet, Mosaic, Painter, Population, Rgb, Scene};
 use smalti::{archive, vector};
 
 use super::photo_path;
@@ -31,7 +31,7 @@ fn drawn_by_resvg(svg: &[u8]) -> Mosaic {
 }
 
 fn drawn(population: &Population, canvas: &Canvas) -> Mosaic {
-    CpuEvaluator::new(vec![]).draw(population, canvas, 1).expect("the twin draws anything")
+    CpuPainter.draw(population, canvas, 1).expect("the twin draws anything")
 }
 
 /// The population with the number of each fly as its colour.
@@ -47,8 +47,9 @@ fn numbered(population: &Population) -> Population {
     Population { background: [255; 3].into(), grout: None, flies, masks, ..*population }
 }
 
-/// Compares every pixel whose samples, and the row of samples around them, all see one fly: resvg must give each channel a
-/// value between those of these samples, give or take `tolerance`. A tile that lies an eighth of a pixel off is found out.
+/// Compares every pixel whose samples, and the row of samples around them, all see one fly: resvg must give each
+/// channel a value between those of these samples, give or take `tolerance`. This detects a tile that lies an eighth of
+/// a pixel off.
 ///
 /// Returns the share of all pixels that were compared; the others have an edge in them.
 fn compare(population: &Population, long_side_px: u32, tolerance: u8) -> f64 {

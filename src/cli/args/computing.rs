@@ -1,0 +1,153 @@
+//! What computes: the flags of all commands that evolve or draw, and the devices and threads they ask for.
+
+use clap::Args;
+
+use crate::cli::files::pipelines;
+use crate::cli::terminal::{self, Verbosity};
+use crate::cli::values;
+use crate::error::{Error, NoDevice, Result};
+use crate::studio::{self, Device};
+use crate::vk::{DeviceRequest, Validation};
+
+/// Most CPU threads.
+const THREADS_MAX: u64 = 1_024;
+
+/// The flags.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Computing")]
+pub(crate) struct ComputingArgs {
+    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
+    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
+    pub device: String,
+    /// CPU threads, 1 to 1,024; changes no result [default: all]
+    #[arg(long, value_name = "T", env = "SMALTI_THREADS", value_parser = thread_choice)]
+    pub threads: Option<ThreadChoice>,
+}
+
+/// How many threads were asked for. An empty SMALTI_THREADS asks for none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct ThreadChoice(Option<u64>);
+
+fn thread_choice(text: &str) -> Result<ThreadChoice, String> {
+    if text.is_empty() { Ok(ThreadChoice(None)) } else { values::count(text).map(Some).map(ThreadChoice) }
+}
+
+/// The flag of commands that can use several devices.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Computing")]
+pub(crate) struct DevicesArg {
+    /// Several devices instead of one, each with pictures of its own: all (every hardware GPU), or a list with commas
+    /// of what --device takes
+    #[arg(long, value_name = "all|LIST")]
+    pub devices: Option<String>,
+}
+
+impl DevicesArg {
+    /// Opens the devices of the list or, without a list, the one of `--device` or SMALTI_DEVICE.
+    ///
+    /// # Errors
+    /// [`Error::NoSuitableDevice`] if one of them does not exist, or if `all` finds none; [`Error::Usage`] if the list
+    /// is empty.
+    pub(crate) fn select(&self, computing: &Computing) -> Result<Vec<Device>> {
+        let Some(list) = &self.devices else { return Ok(vec![computing.select()?]) };
+        if list.trim() == "all" {
+            return studio::select_all(computing.validation, Some(&pipelines::keeper()));
+        }
+        let names: Vec<&str> = list.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
+        if names.is_empty() {
+            return Err(Error::Usage("--devices: expected all, or devices with commas, such as 0,1".to_owned()));
+        }
+        names.into_iter().map(|name| select(&request(name)?, computing.validation)).collect()
+    }
+}
+
+/// What was asked for, checked.
+#[derive(Clone, Debug)]
+pub(crate) struct Computing {
+    pub request: DeviceRequest,
+    pub validation: Validation,
+    threads: Option<usize>,
+}
+
+impl ComputingArgs {
+    /// Checks the flags. With `validation` the device must be one that the validation layer can watch.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] or [`Error::NoSuitableDevice`] that names the flag and what it may be.
+    pub(crate) fn check(&self, validation: Validation) -> Result<Computing> {
+        let request = request(&self.device)?;
+        if validation == Validation::On && request == DeviceRequest::Cpu {
+            let sentence = "--validate watches Vulkan, and --device cpu uses none; drop one of them";
+            return Err(Error::Usage(sentence.to_owned()));
+        }
+        let in_range = |count| values::in_range("--threads", count, 1..=THREADS_MAX).map(|count| count as usize);
+        let asked_for = self.threads.and_then(|ThreadChoice(count)| count);
+        Ok(Computing { request, validation, threads: asked_for.map(in_range).transpose()? })
+    }
+
+    /// Gives the CPU twin its threads, opens the device, and says so if the CPU computes unasked. For commands that
+    /// need nothing between these steps.
+    ///
+    /// # Errors
+    /// As [`ComputingArgs::check`] and [`Computing::select`].
+    pub(crate) fn begin(&self, verbosity: Verbosity) -> Result<Device> {
+        let computing = self.check(Validation::Off)?;
+        computing.start_threads()?;
+        let device = computing.select()?;
+        if verbosity > Verbosity::Quiet {
+            say_device(&device);
+        }
+        Ok(device)
+    }
+}
+
+impl Computing {
+    /// Gives the CPU twin as many threads as were asked for.
+    pub(crate) fn start_threads(&self) -> Result<()> {
+        let Some(count) = self.threads else { return Ok(()) };
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(count)
+            .build_global()
+            .map_err(|error| Error::Usage(format!("--threads {count}: the threads cannot be started ({error})")))
+    }
+
+    /// CPU threads: as many as were asked for, or all.
+    pub(crate) fn thread_count(&self) -> usize {
+        self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+    }
+
+    /// Finds and opens the device.
+    ///
+    /// # Errors
+    /// As [`studio::select`].
+    pub(crate) fn select(&self) -> Result<Device> {
+        select(&self.request, self.validation)
+    }
+}
+
+/// Opens a device, with the pipelines that an earlier run cached for it.
+fn select(request: &DeviceRequest, validation: Validation) -> Result<Device> {
+    studio::select(request, validation, Some(&pipelines::keeper()))
+}
+
+/// Says that the CPU computes, unless the user asked for it.
+pub(crate) fn say_device(device: &Device) {
+    if let Some(reason) = device.stand_in_reason() {
+        terminal::say(&format!("smalti: computing on the CPU, since {reason}"));
+    }
+}
+
+/// The device that was asked for. An empty text, as in an empty SMALTI_DEVICE, asks for none.
+fn request(text: &str) -> Result<DeviceRequest> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Ok(DeviceRequest::Auto);
+    }
+    if text.bytes().all(|byte| byte.is_ascii_digit()) && text.parse::<usize>().is_err() {
+        let why = format!(
+            "--device {text}: there is no device with this number; see smalti devices for the numbers, or use auto"
+        );
+        return Err(Error::NoSuitableDevice { why: NoDevice::Other(why) });
+    }
+    text.parse().map_err(|_| Error::Usage(format!("--device {text}: expected {}", DeviceRequest::FORMS)))
+}

@@ -1,0 +1,162 @@
+//! The whole command line: all commands, with their help. What flags mean is decided where they are defined.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+
+use crate::cli::args::typed::{Typed, one_sentence};
+use crate::cli::commands::bench::BenchArgs;
+use crate::cli::commands::devices::DevicesArgs;
+use crate::cli::commands::evolve::EvolveArgs;
+use crate::cli::commands::gallery::GalleryArgs;
+use crate::cli::commands::manual::{CompletionsArgs, ManArgs};
+use crate::cli::commands::merge::MergeArgs;
+use crate::cli::commands::paper::PaperArgs;
+use crate::cli::commands::plan::PlanArgs;
+use crate::cli::commands::render::RenderArgs;
+use crate::cli::commands::score::ScoreArgs;
+use crate::cli::commands::timelapse::TimelapseArgs;
+use crate::cli::commands::video::VideoArgs;
+use crate::cli::list::BatchArgs;
+use crate::cli::terminal::{self, advice};
+use crate::cli::{commands, config};
+
+/// Evolves pictures into mosaics of thousands of tiles.
+#[derive(Debug, Parser)]
+#[command(
+    name = "smalti",
+    version,
+    about = "Evolves pictures into mosaics of thousands of tiles.",
+    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage or unreadable input, 3 some items failed,\n\
+                  4 no suitable device, 75 interrupted or device lost (run the same command again), 130 second Ctrl-C."
+)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    command: Command,
+    /// Flags in a TOML file; the command line overrides it
+    #[arg(long, global = true, value_name = "FILE", env = "SMALTI_CONFIG", help_heading = "Options")]
+    config: Option<PathBuf>,
+    /// What was typed, and what the file of `--config` added to it.
+    #[arg(skip)]
+    typed: Typed,
+}
+
+impl Cli {
+    /// The command line of this process; if it is wrong, or only asks for help, the exit code after having said so.
+    ///
+    /// # Errors
+    /// The exit code to end with: 0 after help or version, 2 after a wrong command line.
+    pub fn from_command_line() -> Result<Self, ExitCode> {
+        let mut definition = Self::command();
+        definition.build();
+        advice::know_flags(&definition);
+        let tokens = config::expand(std::env::args_os().collect(), &definition).map_err(|error| {
+            terminal::error(&advice::sentence(&error));
+            ExitCode::from(advice::exit_code(&error))
+        })?;
+        let matches = Self::command().try_get_matches_from(&tokens);
+        let parsed = matches.and_then(|matches| Self::from_arg_matches(&matches).map(|cli| (cli, matches)));
+        let typed = |matches| Typed { tokens: tokens.clone(), matches, definition: Self::command() };
+        parsed.map(|(cli, matches)| Self { typed: typed(matches), ..cli }).map_err(|error| {
+            if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+                terminal::error(&one_sentence(&error.to_string(), &command_typed()));
+            } else {
+                // Only a closed pipe can fail here: nobody wants the rest of the help.
+                let _ = error.print();
+            }
+            ExitCode::from(if error.use_stderr() { 2 } else { 0 })
+        })
+    }
+}
+
+/// Does what the command line asks for; the exit code of the process.
+#[must_use]
+pub fn run(cli: &Cli) -> ExitCode {
+    match &cli.command {
+        Command::Evolve(args) => commands::evolve::evolve(args),
+        Command::Batch(args) => commands::batch::make(args, &cli.typed),
+        Command::Render(args) => commands::render::render(args),
+        Command::Timelapse(args) => commands::timelapse::make(args),
+        Command::Devices(args) => commands::devices::list(args),
+        Command::Paper(args) => commands::paper::make(args),
+        Command::Gallery(args) => commands::gallery::make(args),
+        Command::Score(args) => commands::score::score(args),
+        Command::Plan(args) => commands::plan::plan(args, &cli.typed),
+        Command::Merge(args) => commands::merge::merge(args),
+        Command::Video(args) => commands::video::make(args),
+        Command::Bench(args) => commands::bench::bench(args),
+        Command::Completions(args) => commands::manual::completions(args, Cli::command()),
+        Command::Man(args) => commands::manual::man(args, Cli::command()),
+    }
+}
+
+/// The command that was typed, with its subcommand if that is one.
+fn command_typed() -> String {
+    let first = std::env::args().nth(1).unwrap_or_default();
+    let is_known = Cli::command().get_subcommands().any(|command| command.get_name() == first);
+    if is_known { format!("smalti {first}") } else { "smalti".to_owned() }
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Evolve one picture into a mosaic
+    ///
+    /// Thousands of coloured tiles are bred, child by child, until together they look like the picture. The same
+    /// picture, options and seed give the same bytes on every device.
+    Evolve(Box<EvolveArgs>),
+    /// Evolve many pictures, and go on where it was interrupted
+    ///
+    /// One bad picture never stops the others: the reason is in its line of the results, and the exit code is 3.
+    Batch(Box<BatchArgs>),
+    /// Evolve a sequence of pictures into mosaics whose tiles move instead of flickering
+    ///
+    /// Each frame begins with the tiles of the one before, and what holds still in the pictures holds still in the
+    /// mosaics. The same command goes on where it was ended.
+    Video(Box<VideoArgs>),
+    /// Draw a population again, at any size, or write it in another format
+    ///
+    /// At the size at which it evolved the picture is the one that `evolve` wrote.
+    Render(Box<RenderArgs>),
+    /// Make the figures and tables of the paper from your own pictures
+    ///
+    /// Each is a page with its pictures, plots and tables, to be opened from disk.
+    Paper(PaperArgs),
+    /// Show every mask and every shader on the same pictures
+    Gallery(GalleryArgs),
+    /// Turn the snapshots of an evolution into an animation
+    ///
+    /// Draws what `smalti evolve --save-run DIR` kept, in order and at any size.
+    Timelapse(Box<TimelapseArgs>),
+    /// List the Vulkan devices of this machine, and which one would be taken
+    Devices(DevicesArgs),
+    /// Measure how much pictures are like a reference
+    ///
+    /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed
+    /// with numpy, scipy and scikit-image. Of an animation the first frame is measured.
+    Score(ScoreArgs),
+    /// Cut a batch into shards, with scripts that run them on Slurm, Kubernetes, or GNU parallel
+    Plan(Box<PlanArgs>),
+    /// Put the results of several shards or runs together
+    ///
+    /// Tells which pictures failed, and which are missing.
+    Merge(MergeArgs),
+    /// Measure how fast this machine evolves pictures
+    Bench(BenchArgs),
+    /// Print what a shell needs to complete commands and flags
+    Completions(CompletionsArgs),
+    /// Print a manual page, or write all of them
+    Man(ManArgs),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_definition_of_the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

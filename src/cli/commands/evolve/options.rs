@@ -1,0 +1,143 @@
+//! The options of `smalti evolve`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::cli::args::computing::{Computing, ComputingArgs};
+use crate::cli::args::messages::MessageArgs;
+use crate::cli::args::picture::PictureArgs;
+use crate::cli::files::curve_file::CurveFile;
+use crate::cli::files::destination::{self, Destination, Overwrite};
+use crate::cli::files::snapshots::SaveRun;
+use crate::cli::jobs::options::PictureOptions;
+use crate::cli::trace::TraceArgs;
+use crate::cli::values;
+use crate::error::Result;
+use crate::vk::Validation;
+
+const EVOLVE_EXAMPLES: &str = "\
+Examples:
+  smalti evolve photo.jpg -o mosaic.png
+  smalti evolve photo.jpg -o mosaic.png -o flies.npz -n 10k --evals 20M
+  smalti evolve photo.jpg -o mosaic.png --style mosaic --grout auto -n 4000
+  smalti evolve photo.jpg -o paper.png --scheme paper --births 200k --restarts 3 --cool 0.5
+  smalti evolve photo.jpg -o poster.png --output-size 4096 --time 2m
+  smalti evolve photo.jpg -o better.png --init flies.npz --seed 1
+  smalti evolve photo.jpg -o - --quiet > mosaic.png";
+
+#[derive(Clone, Debug, Args)]
+#[command(after_help = EVOLVE_EXAMPLES)]
+pub(crate) struct EvolveArgs {
+    /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP, or the first frame of a GIF
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+
+    /// Where to write the mosaic (.png .jpg .webp .svg .ora) or the population (.npz .csv .json); may repeat; `-`
+    /// writes a PNG to stdout
+    #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
+    pub outputs: Vec<PathBuf>,
+    /// Also write the picture that was evolved towards, fitted to size, as a PNG
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub save_target: Option<PathBuf>,
+    /// Also write how the error fell as a table (.csv) or a plot (.svg); may repeat
+    #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
+    pub curves: Vec<PathBuf>,
+    /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    pub save_run: Option<PathBuf>,
+    /// Most evals or births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a
+    /// 100th of all]
+    #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
+    pub save_every: Option<u64>,
+    /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    /// Only say what would be done; write nothing
+    #[arg(long, help_heading = "Output")]
+    pub dry_run: bool,
+    /// Print one line of JSON about the result to stdout
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+
+    #[command(flatten)]
+    pub picture: PictureArgs,
+
+    #[command(flatten)]
+    pub computing: ComputingArgs,
+    /// Watch every Vulkan call with the validation layer; any message is an error
+    #[arg(long, help_heading = "Computing")]
+    pub validate: bool,
+    #[command(flatten)]
+    pub trace: TraceArgs,
+
+    #[command(flatten)]
+    pub messages: MessageArgs,
+}
+
+/// Whether to do the work, or only to say what would be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mode {
+    Work,
+    DryRun,
+}
+
+/// Where everything goes that is not an output of the picture.
+#[derive(Clone, Debug)]
+pub(super) struct Files {
+    pub save_target: Option<Destination>,
+    /// Where the curve of the evolution goes.
+    pub curves: Vec<CurveFile>,
+    /// Where to keep snapshots.
+    pub save_run: Option<SaveRun>,
+    pub overwrite: Overwrite,
+}
+
+/// All options of `smalti evolve`.
+#[derive(Clone, Debug)]
+pub(super) struct EvolveOptions {
+    pub picture: PictureOptions,
+    pub files: Files,
+    pub mode: Mode,
+    pub computing: Computing,
+}
+
+impl EvolveOptions {
+    /// Checks the flags.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] or [`crate::Error::Parameter`] that names the flag and its range.
+    pub fn new(args: &EvolveArgs) -> Result<Self> {
+        let validation = if args.validate { Validation::On } else { Validation::Off };
+        let outputs = args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?;
+        let files = Files {
+            save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
+            curves: args.curves.iter().map(|path| CurveFile::new(path)).collect::<Result<_>>()?,
+            save_run: args.save_run.as_deref().map(|folder| SaveRun::new(folder, args.save_every)).transpose()?,
+            overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
+        };
+        let computing = args.computing.check(validation)?;
+        let picture = PictureOptions {
+            input: args.input.clone(),
+            outputs,
+            progress: args.messages.progress.unless(args.messages.quiet),
+            ..PictureOptions::new(&args.picture, args.messages.verbosity())?
+        };
+        if args.json {
+            destination::check_stdout_is_free(&picture.outputs)?;
+        }
+        destination::check_size_has_use(&picture.outputs, picture.output_long_side_px)?;
+        Ok(Self { picture, files, mode: if args.dry_run { Mode::DryRun } else { Mode::Work }, computing })
+    }
+
+    /// Every picture or population that will be written.
+    pub fn destinations(&self) -> impl Iterator<Item = &Destination> {
+        self.picture.outputs.iter().chain(&self.files.save_target)
+    }
+
+    /// Every file that will be written.
+    pub fn files_written(&self) -> impl Iterator<Item = &Path> {
+        let curves = self.files.curves.iter().map(|file| file.path.as_path());
+        self.destinations().map(|destination| destination.path.as_path()).chain(curves)
+    }
+}

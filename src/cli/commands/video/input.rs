@@ -1,0 +1,30 @@
+//! Finds the pictures of a sequence: those in a folder, files in order, or a video that ffmpeg takes apart.
+
+use std::ffi::OsStr;
+use std::path::Path;
+
+use super::extract::{Frames, Kept};
+use super::options::VideoOptions;
+use crate::cli::files::inputs::{self, Depth, in_folder, is_named_like_a_picture};
+use crate::cli::terminal::interrupt::Interrupt;
+use crate::error::Result;
+
+/// The frames that the inputs stand for. Those of a video are put into `folder`, and stay there for the next time.
+///
+/// # Errors
+/// [`Error::Input`](crate::error::Error::Input) if a folder or video cannot be read, or holds no frames; otherwise as
+/// [`Kept::of_video`].
+pub(super) fn find(options: &VideoOptions, folder: &Path, interrupt: &Interrupt) -> Result<Frames> {
+    let paths = match &options.inputs[..] {
+        [one] if one.is_dir() => in_folder(one)?,
+        [one] if one.is_file() && (!is_named_like_a_picture(one) || ending(one) == "gif") => {
+            return Kept { folder, span: options.span, interrupt }.of_video(one);
+        }
+        many => inputs::find(many, Depth::Flat, folder)?.into_iter().map(|one| one.path).collect(),
+    };
+    Ok(Frames { paths, frames_per_s: None })
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase()
+}

@@ -1,0 +1,116 @@
+//! Takes a video apart into frames, with the programs `ffmpeg` and `ffprobe`.
+
+use std::ffi::OsString;
+use std::io::{self, Read};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use crate::cli::files::child::in_its_own_group;
+use crate::cli::terminal::interrupt::Interrupt;
+use crate::error::{Error, Result};
+
+/// Time between two looks at whether a process has ended, or must be ended.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
+
+/// Writes all frames of `video` into `folder` as PNG files that are named by their numbers. Returns the frames per
+/// second, rounded, if the video tells them.
+///
+/// # Errors
+/// [`Error::Input`] if there is no ffmpeg, or it cannot read the video; [`Error::Interrupted`].
+pub(crate) fn take_apart(video: &Path, folder: &Path, interrupt: &Interrupt) -> Result<Option<u64>> {
+    let mut command = Command::new("ffmpeg");
+    command.args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-i"]).arg(as_file(video));
+    command.args([
+        "-map",
+        "0:v:0",
+        "-fflags",
+        "+bitexact",
+        "-flags:v",
+        "+bitexact",
+        "-pix_fmt",
+        "rgb24",
+        "-f",
+        "image2",
+    ]);
+    run(command.arg(as_file(&folder.join("%08d.png"))), video, interrupt)?;
+    let mut command = Command::new("ffprobe");
+    command.args(["-v", "error", "-select_streams", "v:0", "-show_entries", "stream=r_frame_rate", "-of", "csv=p=0"]);
+    let told = run(command.arg(as_file(video)), video, interrupt)?;
+    Ok(rate(&String::from_utf8_lossy(&told)))
+}
+
+/// The path in a form that ffmpeg does not take for a protocol.
+fn as_file(path: &Path) -> OsString {
+    let mut file = OsString::from("file:");
+    file.push(path);
+    file
+}
+
+/// A process that is killed if this is dropped before it has ended.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Both calls fail only if the process has already ended.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Runs a program to its end; returns what it wrote to stdout.
+fn run(command: &mut Command, video: &Path, interrupt: &Interrupt) -> Result<Vec<u8>> {
+    let unusable = |error: io::Error| {
+        let reason = match error.kind() {
+            io::ErrorKind::NotFound => "needs the program ffmpeg, which is not installed".to_owned(),
+            _ => format!("needs the program ffmpeg, which cannot be started ({error})"),
+        };
+        Error::input(video, format!("{reason}; install the package ffmpeg, or give a folder of frames"))
+    };
+    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = Running(in_its_own_group(command).spawn().map_err(unusable)?);
+    let (stdout, stderr) = (child.0.stdout.take().map(read_all), child.0.stderr.take().map(read_all));
+    let status = loop {
+        interrupt.check()?;
+        match child.0.try_wait().map_err(unusable)? {
+            Some(status) => break status,
+            None => std::thread::sleep(LOOK_EVERY),
+        }
+    };
+    let said = |pipe: Option<JoinHandle<Vec<u8>>>| pipe.and_then(|pipe| pipe.join().ok()).unwrap_or_default();
+    let (stdout, stderr) = (said(stdout), said(stderr));
+    if status.success() {
+        return Ok(stdout);
+    }
+    let said = String::from_utf8_lossy(&stderr);
+    let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it gave no reason").trim();
+    Err(Error::input(video, format!("cannot be read by ffmpeg ({last}); give another video, or a folder of frames")))
+}
+
+/// Reads a pipe to its end, since a full pipe would block its writer.
+fn read_all(mut pipe: impl Read + Send + 'static) -> JoinHandle<Vec<u8>> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        // What was read before a failure may tell its reason.
+        let _ = pipe.read_to_end(&mut bytes);
+        bytes
+    })
+}
+
+/// Frames per second, rounded, from a fraction such as `30000/1001`.
+fn rate(text: &str) -> Option<u64> {
+    let (frames, seconds) = text.trim().split_once('/')?;
+    let (frames, seconds) = (frames.parse::<u64>().ok()?, seconds.parse::<u64>().ok()?);
+    (frames > 0 && seconds > 0).then(|| ((frames + seconds / 2) / seconds).max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::cli::film::apart::rate;
+
+    #[test]
+    fn a_rate_is_a_fraction_rounded() {
+        assert_eq!(["25/1\n", "30000/1001", "1/3", "0/0", ""].map(rate), [Some(25), Some(30), Some(1), None, None]);
+    }
+}

@@ -1,0 +1,186 @@
+//! Draws populations from files, one after the other, and hands each frame to all films at once. Each film encodes in
+//! its own thread.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+
+use indicatif::HumanCount;
+use serde_json::json;
+
+use super::Film;
+use crate::archive;
+use crate::cli::files::memory;
+use crate::cli::terminal::interrupt::Interrupt;
+use crate::cli::terminal::progress::{Progress, Stage, short_time};
+use crate::error::{Error, Result};
+use crate::model::{Canvas, Mosaic, Painter, Population, Rgb};
+use crate::studio::{Device, estimate_bytes, usual_supersampling};
+
+/// How many frames may wait for each output's encoder.
+const QUEUE_LENGTH: usize = 1;
+
+/// How the work ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum End {
+    Complete,
+    Interrupted,
+}
+
+/// How populations are to be shown.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shown {
+    /// Longer side of the frames in px; `None` draws them as evolved.
+    pub long_side_px: Option<u32>,
+    /// `None` takes the background of the populations.
+    pub background: Option<Rgb>,
+    pub film_count: usize,
+}
+
+/// Draws every frame.
+pub(crate) struct Camera {
+    painter: Box<dyn Painter>,
+    /// The population's size.
+    size_px: (u32, u32),
+    pub canvas: Canvas,
+    supersampling: u32,
+    background: Option<Rgb>,
+}
+
+/// Draws the populations and gives each frame to all films. Returns each film with its outcome.
+///
+/// # Errors
+/// If a population cannot be read or drawn. If only a film fails, the others go on.
+pub(crate) fn shoot(
+    films: Vec<Film>,
+    paths: &[&Path],
+    camera: &mut Camera,
+    interrupt: &Interrupt,
+    mut progress: Progress,
+) -> Result<(End, Vec<Result<Film>>)> {
+    std::thread::scope(|scope| {
+        let mut feeds = Vec::new();
+        let workers: Vec<_> = films
+            .into_iter()
+            .map(|mut film| {
+                let (feed, frames) = sync_channel::<Arc<Mosaic>>(QUEUE_LENGTH);
+                feeds.push(feed);
+                scope.spawn(move || frames.into_iter().try_for_each(|frame| film.add(&frame)).map(|()| film))
+            })
+            .collect();
+        let drawn = draw(feeds, paths, camera, interrupt, &mut progress);
+        progress.finish();
+        let ended = || Err(Error::Internal("a thread that encodes ended".to_owned()));
+        let films = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| ended())).collect();
+        drawn.map(|end| (end, films))
+    })
+}
+
+/// Draws the populations into the feeds. The workers end when the feeds are dropped.
+fn draw(
+    mut feeds: Vec<SyncSender<Arc<Mosaic>>>,
+    paths: &[&Path],
+    camera: &mut Camera,
+    interrupt: &Interrupt,
+    progress: &mut Progress,
+) -> Result<End> {
+    let began = Instant::now();
+    for (done, path) in paths.iter().enumerate() {
+        if interrupt.is_requested() {
+            return Ok(End::Interrupted);
+        }
+        let frame = Arc::new(camera.draw(path)?);
+        feeds.retain(|feed| feed.send(Arc::clone(&frame)).is_ok());
+        if feeds.is_empty() {
+            break;
+        }
+        let standing = FramesDone { elapsed: began.elapsed(), frames: done + 1, frame_count: paths.len() };
+        if progress.is_due(standing.elapsed) {
+            progress.show(&standing);
+        }
+    }
+    // A Ctrl-C during the last frame counts, too.
+    Ok(if interrupt.is_requested() { End::Interrupted } else { End::Complete })
+}
+
+impl Camera {
+    /// Opens the device for populations like `first`.
+    ///
+    /// # Errors
+    /// If the frames do not fit into memory, or the device has no room.
+    pub(crate) fn open(shown: Shown, device: &Device, first: &Population) -> Result<Self> {
+        let (width_px, height_px) = (first.width_px, first.height_px);
+        let evolved_px = width_px.max(height_px);
+        let canvas = shown.long_side_px.map_or(Canvas::evaluation(width_px, height_px), |long| {
+            if long == evolved_px {
+                Canvas::evaluation(width_px, height_px)
+            } else {
+                Canvas::scaled(width_px, height_px, long)
+            }
+        });
+        let is_resized = canvas != Canvas::evaluation(width_px, height_px);
+        let long_side_px = canvas.width_px.max(canvas.height_px);
+        let pixel_count = u64::from(canvas.width_px) * u64::from(canvas.height_px);
+        // Each output holds the frame before, the changes to it, and the waiting frames.
+        let held = pixel_count.saturating_mul(1 + 2 * shown.film_count as u64);
+        memory::check(estimate_bytes(0, first.flies.len(), held))?;
+        Ok(Self {
+            painter: device.open_painter()?,
+            size_px: (width_px, height_px),
+            canvas,
+            supersampling: if is_resized { usual_supersampling(long_side_px, evolved_px) } else { 1 },
+            background: shown.background,
+        })
+    }
+
+    /// The frame of the population at `path`.
+    fn draw(&mut self, path: &Path) -> Result<Mosaic> {
+        let mut population = archive::read(path)?.population;
+        if (population.width_px, population.height_px) != self.size_px {
+            return Err(Error::input(path, "differs in size from the first population; remove it"));
+        }
+        // Animations have no alpha.
+        population.background = self.background.unwrap_or(population.background.color()).into();
+        self.painter.draw(&population, &self.canvas, self.supersampling)
+    }
+}
+
+/// How far the drawing has come.
+struct FramesDone {
+    elapsed: Duration,
+    frames: usize,
+    frame_count: usize,
+}
+
+impl FramesDone {
+    fn eta_s(&self) -> f64 {
+        self.elapsed.as_secs_f64() / self.frames as f64 * (self.frame_count - self.frames) as f64
+    }
+}
+
+impl Stage for FramesDone {
+    fn elapsed(&self) -> Duration {
+        self.elapsed
+    }
+
+    fn share(&self) -> f64 {
+        self.frames as f64 / self.frame_count as f64
+    }
+
+    fn line(&self) -> String {
+        let count = |frames: usize| HumanCount(frames as u64);
+        format!("{}/{} frames, {} left", count(self.frames), count(self.frame_count), short_time(self.eta_s()))
+    }
+
+    fn json_line(&self) -> String {
+        let rounded = |value: f64| (value * 10.0).round() / 10.0;
+        json!({
+            "frames": self.frames,
+            "frame_count": self.frame_count,
+            "elapsed_s": rounded(self.elapsed.as_secs_f64()),
+            "eta_s": rounded(self.eta_s()),
+        })
+        .to_string()
+    }
+}

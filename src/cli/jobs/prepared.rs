@@ -1,0 +1,151 @@
+//! The work on one picture: it is read and checked, then evolved and drawn. The command decides what is written, and
+//! where.
+
+use std::time::{Duration, Instant};
+
+use super::curve::Curve;
+use super::options::PictureOptions;
+use super::row::Row;
+use super::watch::{Watch, Watchers};
+use crate::cli::files::destination::{self, Destination};
+use crate::cli::files::outputs;
+use crate::cli::terminal::progress::Progress;
+use crate::cli::terminal::{self, Verbosity, milliseconds};
+use crate::cli::trace::TraceInstruments;
+use crate::error::Result;
+use crate::evolve::{Ended, Ending};
+use crate::model::{Canvas, Painter};
+use crate::studio::{self, Device, Drawn, Job, Provenance, Provenances, finish};
+
+/// A picture that is ready to be evolved.
+#[derive(Debug)]
+pub(crate) struct Prepared {
+    pub job: Job,
+    pub provenances: Provenances,
+    /// How long it took to read.
+    pub load_time: Duration,
+}
+
+/// What an evolution led to.
+pub(crate) struct Evolved {
+    pub ending: Ending,
+    /// The best population.
+    pub drawn: Drawn,
+    /// The curve of the evolution, if it was asked for.
+    pub curve: Option<Curve>,
+}
+
+/// What is kept of the course of an evolution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Keep {
+    Curve,
+    Nothing,
+}
+
+impl Prepared {
+    /// Reads the picture.
+    ///
+    /// # Errors
+    /// As [`Job::load`].
+    pub fn load(options: &PictureOptions, id: &str) -> Result<Self> {
+        let began = Instant::now();
+        let _span = options.tracer.span("load").tell("picture", id);
+        let job = {
+            let _span = options.tracer.span("decode");
+            Job::load(&options.input, &options.settings)?
+        };
+        let load_time = began.elapsed();
+        let resized_px = options.resized_px(job.target.width_px(), job.target.height_px());
+        let provenances = Provenances::new(&options.settings, &job, resized_px);
+        Ok(Self { job, provenances, load_time })
+    }
+
+    /// The provenance of an output.
+    pub fn of_output(&self, output: &Destination) -> &Provenance {
+        if output.is_picture() { &self.provenances.picture } else { &self.provenances.population }
+    }
+
+    /// The provenance in the row of the result: that of the pictures if there are any, else that of the population.
+    pub fn of_row(&self, options: &PictureOptions) -> &Provenance {
+        let has_picture = options.outputs.iter().any(Destination::is_picture);
+        if has_picture { &self.provenances.picture } else { &self.provenances.population }
+    }
+
+    /// Checks what depends on the picture's size; returns about how many bytes the work needs.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] if the scheme does not fit the number of tiles; [`crate::Error::Usage`] if a format
+    /// cannot hold the picture.
+    pub fn check(&self, options: &PictureOptions) -> Result<u64> {
+        self.job.check()?;
+        let (width_px, height_px) = (self.job.target.width_px(), self.job.target.height_px());
+        let written = options.output_long_side_px.map(|long| Canvas::scaled(width_px, height_px, long));
+        let written_px = written.map_or((width_px, height_px), |canvas| (canvas.width_px, canvas.height_px));
+        destination::check_fits_formats(&options.outputs, written_px)?;
+        let written_pixel_count = u64::from(written_px.0) * u64::from(written_px.1);
+        Ok(self.job.memory_bytes(written_pixel_count * destination::memory_weight(&options.outputs)))
+    }
+
+    /// Evolves the picture and draws its best population; notes the result in `row`.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn evolve(
+        &self,
+        options: &PictureOptions,
+        device: &Device,
+        watchers: &mut Watchers<'_>,
+        keep: Keep,
+        row: &mut Row,
+    ) -> Result<Evolved> {
+        let _span = options.tracer.span("evolve").tell("picture", row.id.as_str());
+        let progress = Progress::new(options.progress);
+        let mut watch = Watch::begin(watchers, &options.settings, progress, self.job.evals_planned());
+        let mut curve = (keep == Keep::Curve).then(|| Curve::new(self.job.evals_planned()));
+        let mut course = options.tracer.course();
+        let mut instruments = TraceInstruments::new(&options.tracer);
+        let observers = &mut (&mut (&mut watch, &mut curve), &mut course);
+        let evolved = studio::evolve(&self.job, device, observers, &mut instruments);
+        let took = watch.finish();
+        if let Some(reason) = instruments.stand_in() {
+            row.device = Some("CPU".to_owned());
+            if options.verbosity > Verbosity::Quiet {
+                terminal::say(&format!("smalti: searching on the CPU, since {reason}"));
+            }
+        }
+        row.evolve_ms = milliseconds(took);
+        let ended = evolved?;
+        let mut painter = options.tracer.painter(device.open_painter()?);
+        let (ending, drawn) = self.draw(options, ended, &mut *painter, row)?;
+        drop(painter);
+        device.check_validation()?;
+        Ok(Evolved { ending, drawn, curve })
+    }
+
+    /// Draws the result of an evolution, and notes it in `row`.
+    ///
+    /// # Errors
+    /// If the device fails, or if the mosaic is not what was scored.
+    pub fn draw(
+        &self,
+        options: &PictureOptions,
+        ended: Ended,
+        painter: &mut dyn Painter,
+        row: &mut Row,
+    ) -> Result<(Ending, Drawn)> {
+        row.note_ended(&ended, &self.job);
+        let mut finished = finish(&self.job, ended, painter, options.output_long_side_px)?;
+        outputs::draw(&mut finished.drawn, painter, destination::pieces(&options.outputs), options.verbosity)?;
+        row.psnr = finished.psnr_db;
+        Ok((finished.ending, finished.drawn))
+    }
+}
+
+impl Row {
+    /// Notes what is known about a picture once it has been read.
+    pub fn note_prepared(&mut self, prepared: &Prepared, options: &PictureOptions) {
+        self.load_ms = milliseconds(prepared.load_time);
+        self.tiles = Some(prepared.job.fly_count);
+        self.key = Some(prepared.of_row(options).key().to_owned());
+    }
+}

@@ -1,0 +1,142 @@
+//! Ctrl-C and similar signals: the first one asks for an orderly end, a second Ctrl-C ends the process at once.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use signal_hook::consts::SIGINT;
+use signal_hook::low_level::unregister;
+use signal_hook::{SigId, flag};
+
+use crate::error::{Error, Result};
+
+/// Exit code after an orderly end before the work was done. The same command may be run again.
+pub(crate) const EXIT_INTERRUPTED: u8 = 75;
+/// Exit code of the second Ctrl-C.
+const EXIT_AT_ONCE: i32 = 130;
+
+#[cfg(unix)]
+const SIGNALS: [i32; 3] = [SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGUSR1];
+#[cfg(not(unix))]
+const SIGNALS: [i32; 2] = [SIGINT, signal_hook::consts::SIGTERM];
+
+/// Whether a signal asked for the work to end. All threads share it.
+#[derive(Debug, Default)]
+pub(crate) struct Interrupt {
+    requested: Arc<AtomicBool>,
+    /// Whether the next Ctrl-C ends the process.
+    armed: Arc<AtomicBool>,
+    arming: Mutex<Arming>,
+}
+
+/// Decides when [`Interrupt::armed`] may be set.
+#[derive(Debug, Default)]
+struct Arming {
+    /// The actions of the signals.
+    actions: Vec<SigId>,
+    /// Threads that are writing.
+    writers: usize,
+}
+
+impl Interrupt {
+    /// Listens to the signals from now on.
+    pub(crate) fn listen() -> Result<Self> {
+        let interrupt = Self::default();
+        interrupt
+            .register()
+            .map_err(|error| Error::Internal(format!("the handlers of signals cannot be installed ({error})")))?;
+        Ok(interrupt)
+    }
+
+    fn register(&self) -> std::io::Result<()> {
+        // Registered before the flags: actions run in the order of registration, and the first Ctrl-C must find `armed`
+        // still false.
+        flag::register_conditional_shutdown(SIGINT, EXIT_AT_ONCE, Arc::clone(&self.armed))?;
+        for signal in SIGNALS {
+            flag::register(signal, Arc::clone(&self.requested))?;
+        }
+        // Without a handler, a file that exceeds `ulimit -f` would kill the process. With one, the write fails instead.
+        #[cfg(unix)]
+        flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
+        self.register_arming(&mut self.arming())
+    }
+
+    fn register_arming(&self, arming: &mut Arming) -> std::io::Result<()> {
+        for signal in SIGNALS {
+            arming.actions.push(flag::register(signal, Arc::clone(&self.armed))?);
+        }
+        Ok(())
+    }
+
+    fn arming(&self) -> MutexGuard<'_, Arming> {
+        self.arming.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Ends the work as a signal would.
+    pub(crate) fn request(&self) {
+        self.requested.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether a signal came. Does not wait for writers.
+    pub(crate) fn is_requested(&self) -> bool {
+        self.requested.load(Ordering::Relaxed)
+    }
+
+    /// # Errors
+    /// [`Error::Interrupted`] if a signal came.
+    pub(crate) fn check(&self) -> Result<()> {
+        if self.is_requested() { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
+    /// Runs `write` so that no Ctrl-C can cut it short, which would leave a temporary file behind.
+    ///
+    /// Only for writes that end by themselves: one that waits for a reader could not be interrupted.
+    pub(crate) fn while_writing<T>(&self, write: impl FnOnce() -> T) -> T {
+        self.begin_writing();
+        let written = write();
+        self.end_writing();
+        written
+    }
+
+    fn begin_writing(&self) {
+        let mut arming = self.arming();
+        // This comes first, so that no signal can arm it again.
+        arming.actions.drain(..).for_each(|action| {
+            unregister(action);
+        });
+        self.armed.store(false, Ordering::Relaxed);
+        arming.writers += 1;
+    }
+
+    fn end_writing(&self) {
+        let mut arming = self.arming();
+        arming.writers -= 1;
+        if arming.writers > 0 {
+            return;
+        }
+        // If that fails, there is nothing left to protect, since the process is about to end.
+        let _ = self.register_arming(&mut arming);
+        if self.is_requested() {
+            self.armed.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use signal_hook::low_level::raise;
+
+    use super::*;
+
+    #[test]
+    fn no_ctrl_c_ends_the_process_while_it_writes_and_the_next_one_after_it_would() {
+        let interrupt = Interrupt::listen().expect("signals can be handled");
+        interrupt.while_writing(|| {
+            interrupt.while_writing(|| raise(SIGINT).expect("the signal is sent"));
+            for _ in 0..3 {
+                raise(SIGINT).expect("the signal is sent");
+            }
+        });
+        assert!(interrupt.is_requested());
+        assert!(interrupt.armed.load(Ordering::Relaxed), "but none may come: it would end this test");
+    }
+}

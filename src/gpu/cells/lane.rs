@@ -1,0 +1,72 @@
+//! One search among those of a device: what the host knows of it.
+
+use super::buffers::LaneSlices;
+use super::layout::SearchHeader;
+use super::pass::Variant;
+use super::plan::Plan;
+use crate::error::Error;
+use crate::model::cells::{Course, Standing};
+
+/// A search among those of the device.
+pub(super) struct Lane {
+    pub course: Course,
+    pub plan: Plan,
+    pub variant: Variant,
+    pub slices: LaneSlices,
+    pub standing: Standing,
+    /// The objective of the population that was loaded.
+    pub objective: i64,
+    /// Rounds that it was asked for since it was loaded.
+    pub wanted: u32,
+    /// Iterations that had something to do so far.
+    pub iterations: u32,
+    pub has_failed: bool,
+    pub failure: Option<Error>,
+    /// Whether the pixels still hold depths from before the last spreading.
+    pub has_old_depths: bool,
+}
+
+impl Lane {
+    /// A lane that nothing was loaded into yet.
+    pub fn new(course: Course, plan: Plan, variant: Variant, slices: LaneSlices) -> Self {
+        Self {
+            course,
+            plan,
+            variant,
+            slices,
+            standing: Standing::default(),
+            objective: 0,
+            wanted: 0,
+            iterations: 0,
+            has_failed: false,
+            failure: None,
+            has_old_depths: false,
+        }
+    }
+
+    pub fn is_busy(&self) -> bool {
+        self.standing.rounds < self.wanted && !self.has_failed
+    }
+
+    /// Takes what the header says after a submission.
+    pub fn absorb(&mut self, header: &SearchHeader) {
+        if header.overrun != 0 {
+            self.has_failed = true;
+            self.failure = Some(Error::Internal(format!(
+                "a step of cell {} needs more than the {} turns of loops that a dispatch of the cells pass may take",
+                header.overrun - 1,
+                self.variant.shape.budget
+            )));
+            return;
+        }
+        let wide = |low: u32, high: u32| u64::from(low) | u64::from(high) << 32;
+        self.standing = Standing {
+            rounds: header.round,
+            evals: wide(header.evals_low, header.evals_high),
+            births: wide(header.births_low, header.births_high),
+            accepted: wide(header.accepted_low, header.accepted_high),
+            objective: self.objective + wide(header.change_low, header.change_high) as i64,
+        };
+        self.iterations = header.iterations;
+    }
+}

@@ -1,0 +1,394 @@
+//! The cells searches of a Vulkan device. A submission makes many rounds of all lanes, which the host does not see one
+//! by one. Twin: `cpu/cells/`.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
+
+use super::buffers::{self, LaneSlices, POOLS, Part, SearchBuffers};
+use super::lane::Lane;
+use super::layout::{CellRecord, FlyRecord, SearchHeader};
+use super::pass::{CellsPass, LaneSize, OldDepths, Team, Variant};
+use super::plan::{PIXEL_WORDS, Plan};
+use super::shape::CellShape;
+use super::state;
+use crate::cpu::cells::CpuSearch;
+use crate::error::{Error, Result};
+use crate::gpu::pools::{BufferRange, Growth, Needs};
+use crate::model::Fly;
+use crate::model::cells::rules::STEP_FIRST;
+use crate::model::cells::{Course, Search, SearchLanes, SearchState, Stacks, Standing, depths};
+use crate::vk::{Device, DeviceKind, PassTime, ReadTicket, Recorder, Timing};
+
+/// Most iterations of a submission, which keep it well below a watchdog's second. Software Vulkan has no watchdog, but
+/// runs the lanes of a dispatch one after the other; there all lanes share this number.
+const ITERATIONS_MAX: u32 = 16;
+
+/// Searches on a Vulkan device that share its dispatches. Their sizes, numbers of flies and rules may differ.
+///
+/// Memory bounds the number of lanes: no buffer that they share may be larger than shaders can see, and several lanes
+/// together may take half of the device's memory.
+pub struct VulkanLanes {
+    device: Arc<Device>,
+    recorder: Recorder,
+    pass: CellsPass,
+    kins: Vec<Kin>,
+    /// By number, without those that are free.
+    lanes: Vec<Option<Lane>>,
+    /// Whether the rules on the device and the stages of the pass are those of the lanes.
+    is_arranged: bool,
+}
+
+/// The lanes of one variant. They share buffers that no other lanes use, so that dispatches of different kins need no
+/// barrier between them.
+struct Kin {
+    variant: Variant,
+    buffers: SearchBuffers,
+    /// The lanes in the order of their rules on the device.
+    order: Vec<usize>,
+}
+
+impl VulkanLanes {
+    /// Creates the searches of a device, none yet. With [`Timing::On`] each stage of a submission is timed, if the
+    /// device has timestamps.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn create(device: &Arc<Device>, timing: Timing) -> Result<Self> {
+        Ok(Self {
+            device: Arc::clone(device),
+            recorder: Recorder::create(device, "cells search", timing)?,
+            pass: CellsPass::create(device)?,
+            kins: Vec::new(),
+            lanes: Vec::new(),
+            is_arranged: false,
+        })
+    }
+
+    /// As [`SearchLanes::admit`], with the work of a cell cut otherwise than is best for the device.
+    ///
+    /// # Errors
+    /// As of [`SearchLanes::admit`].
+    pub fn admit_with_shape(
+        &mut self,
+        course: Course,
+        first: Option<&[Fly]>,
+        shape: CellShape,
+    ) -> Result<Option<usize>> {
+        state::check(&course)?;
+        shape.check(self.device.info())?;
+        let plan = Plan::new(&course);
+        let variant = Variant::new(&course, shape);
+        let needs = buffers::needs(&course, &plan, shape);
+        let Some(slices) = self.take_slices(variant, &needs)? else { return Ok(None) };
+        let number = self.lanes.iter().position(Option::is_none).unwrap_or(self.lanes.len());
+        if number == self.lanes.len() {
+            self.lanes.push(None);
+        }
+        self.lanes[number] = Some(Lane::new(course, plan, variant, slices));
+        if let Err(error) = self.begin(number, first) {
+            self.dismiss(number);
+            return Err(error);
+        }
+        Ok(Some(number))
+    }
+
+    /// Finds room for a lane among those of its variant.
+    fn take_slices(&mut self, variant: Variant, needs: &Needs<'_, POOLS>) -> Result<Option<LaneSlices>> {
+        self.pass.disband();
+        self.is_arranged = false;
+        let place = match self.kins.iter().position(|kin| kin.variant == variant) {
+            Some(place) => place,
+            None => {
+                let buffers = SearchBuffers::create(&self.device, &mut self.recorder)?;
+                self.kins.push(Kin { variant, buffers, order: Vec::new() });
+                self.kins.len() - 1
+            }
+        };
+        let others = self.kins.iter().filter(|kin| kin.variant != variant).map(|kin| kin.buffers.bytes());
+        // A lane alone may take what the device has; more of them share half of it.
+        let bytes_max = (self.device.info().memory_bytes / 2).saturating_sub(others.sum());
+        let is_alone = self.lanes.iter().all(Option::is_none);
+        let growth = if is_alone { Growth::Alone } else { Growth::Shared { bytes_max } };
+        let taken = self.kins[place].buffers.admit(&mut self.recorder, needs, growth);
+        if self.kins[place].buffers.is_empty() {
+            self.kins.remove(place);
+        }
+        taken
+    }
+
+    fn kin(&self, variant: Variant) -> &Kin {
+        let kin = self.kins.iter().find(|kin| kin.variant == variant);
+        kin.unwrap_or_else(|| panic!("lanes of {variant:?} have no buffers"))
+    }
+
+    /// Where a lane's slice lies in the buffer of a part.
+    fn range(&self, number: usize, part: Part) -> BufferRange {
+        let lane = self.lane(number);
+        self.kin(lane.variant).buffers.range(part, &lane.slices)
+    }
+
+    /// Times of the stages of the last submission, by the stems of their shaders; empty unless created with timestamps.
+    #[must_use]
+    pub fn pass_times(&self) -> &[PassTime] {
+        self.recorder.pass_times()
+    }
+
+    fn lane(&self, lane: usize) -> &Lane {
+        self.lanes[lane].as_ref().unwrap_or_else(|| no_lane(lane))
+    }
+
+    fn lane_mut(&mut self, lane: usize) -> &mut Lane {
+        self.lanes[lane].as_mut().unwrap_or_else(|| no_lane(lane))
+    }
+
+    /// Writes the state that a lane begins with.
+    fn begin(&mut self, number: usize, first: Option<&[Fly]>) -> Result<()> {
+        let lane = self.lane(number);
+        let (course, plan) = (lane.course.clone(), lane.plan);
+        self.write(number, Part::Guide, bytemuck::cast_slice(&course.guide.samples))?;
+        self.write(number, Part::Header, bytemuck::bytes_of(&SearchHeader::default()))?;
+        self.write(number, Part::Cells, bytemuck::cast_slice(&vec![CellRecord::default(); plan.cell_count as usize]))?;
+        let standing = match first {
+            Some(flies) => self.write_flies(number, flies)?,
+            None => self.write_bare(number)?,
+        };
+        if let Some(flies) = first.filter(|_| course.rules.leash > 0) {
+            let origins: Vec<FlyRecord> = flies.iter().map(FlyRecord::new).collect();
+            self.write(number, Part::Origins, bytemuck::cast_slice(&origins))?;
+        }
+        let lane = self.lane_mut(number);
+        (lane.standing, lane.objective) = (standing, standing.objective);
+        (lane.wanted, lane.iterations, lane.has_old_depths) = (0, 0, false);
+        (lane.has_failed, lane.failure) = (false, None);
+        Ok(())
+    }
+
+    /// Without flies the state is known. Stacks that are empty may hold anything.
+    fn write_bare(&mut self, number: usize) -> Result<Standing> {
+        let Lane { course, plan, .. } = self.lane(number);
+        let fly_count = course.fly_count;
+        let (pixels, objective) = state::bare_words(course, plan);
+        self.write(number, Part::Flies, bytemuck::cast_slice(&vec![FlyRecord::new(&Fly::ABSENT); fly_count]))?;
+        self.write(number, Part::Pixels, bytemuck::cast_slice(&pixels))?;
+        self.write(number, Part::Steps, bytemuck::cast_slice(&vec![STEP_FIRST; fly_count]))?;
+        self.write(number, Part::Fitness, bytemuck::cast_slice(&vec![0_i32; fly_count]))?;
+        Ok(Standing { objective, ..Standing::default() })
+    }
+
+    fn write_flies(&mut self, number: usize, flies: &[Fly]) -> Result<Standing> {
+        // It happens once, so the twin's answer is good enough, and exact.
+        let Lane { course, plan, .. } = self.lane(number);
+        let mut twin = CpuSearch::new(course.clone());
+        twin.load(flies)?;
+        let SearchState { flies, steps, fitness } = twin.read_back()?;
+        let (pixels, stacks) = state::state_words(course, plan, &flies, &twin.read_back_stacks()?);
+        let records: Vec<FlyRecord> = flies.iter().map(FlyRecord::new).collect();
+        let fitness: Vec<i32> = fitness.into_iter().map(|fitness| fitness as i32).collect();
+        self.write(number, Part::Flies, bytemuck::cast_slice(&records))?;
+        self.write(number, Part::Pixels, bytemuck::cast_slice(&pixels))?;
+        self.write(number, Part::Steps, bytemuck::cast_slice(&steps))?;
+        self.write(number, Part::Fitness, bytemuck::cast_slice(&fitness))?;
+        self.write(number, Part::Stacks, bytemuck::cast_slice(&stacks))?;
+        Ok(twin.standing())
+    }
+
+    /// Writes the beginning of a lane's slice.
+    fn write(&mut self, number: usize, part: Part, bytes: &[u8]) -> Result<()> {
+        let BufferRange { buffer, offset, size_bytes } = self.range(number, part);
+        if bytes.len() as u64 > size_bytes {
+            return Err(Error::Internal(format!("{} bytes for the {size_bytes} of {part:?} of a lane", bytes.len())));
+        }
+        self.recorder.write_buffer(&buffer, offset, bytes)
+    }
+
+    /// Asks for the bytes of a lane's slice.
+    fn ask_for(&mut self, number: usize, part: Part) -> Result<ReadTicket> {
+        let BufferRange { buffer, offset, size_bytes } = self.range(number, part);
+        self.recorder.read_buffer(&buffer, offset, size_bytes)
+    }
+
+    fn take<T: Pod + Zeroable>(&self, ticket: &ReadTicket) -> Result<Vec<T>> {
+        let mut values = vec![T::zeroed(); ticket.size_bytes() as usize / size_of::<T>()];
+        self.recorder.read_into(ticket, bytemuck::cast_slice_mut(&mut values))?;
+        Ok(values)
+    }
+
+    /// The numbers of the lanes there are.
+    fn numbers(&self) -> Vec<usize> {
+        (0..self.lanes.len()).filter(|&number| self.lanes[number].is_some()).collect()
+    }
+
+    /// Puts the rules of all lanes on the device.
+    fn arrange(&mut self) -> Result<()> {
+        let numbers = self.numbers();
+        let mut teams = Vec::new();
+        for place in 0..self.kins.len() {
+            let variant = self.kins[place].variant;
+            let order: Vec<usize> =
+                numbers.iter().copied().filter(|&number| self.lane(number).variant == variant).collect();
+            let lanes = || order.iter().map(|&number| self.lane(number));
+            let team = lanes().map(|lane| LaneSize::new(&lane.plan, lane.course.fly_count)).collect();
+            let rules: Vec<_> =
+                lanes().map(|lane| state::rules_record(&lane.course, &lane.plan, &lane.slices)).collect();
+            let kin = &mut self.kins[place];
+            self.recorder.write_buffer(kin.buffers.part(Part::Rules), 0, bytemuck::cast_slice(rules.as_flattened()))?;
+            kin.order = order;
+            teams.push(Team { variant, group: kin.buffers.bind(self.pass.any_pipeline())?, lanes: team });
+        }
+        self.pass.arrange(&teams)?;
+        self.is_arranged = true;
+        Ok(())
+    }
+
+    /// Iterations after which about one of the busy lanes is done.
+    fn iterations(&self, busy: &[usize]) -> u32 {
+        let needed = |lane: &Lane| {
+            let left = lane.wanted - lane.standing.rounds;
+            // As many as rounds took so far, on average.
+            lane.iterations.div_ceil(lane.standing.rounds.max(1)).max(1).saturating_mul(left)
+        };
+        let most = match self.device.info().kind {
+            DeviceKind::Cpu => (ITERATIONS_MAX / busy.len().max(1) as u32).max(1),
+            _ => ITERATIONS_MAX,
+        };
+        busy.iter().map(|&number| needed(self.lane(number))).min().unwrap_or(1).clamp(1, most)
+    }
+
+    /// Records what the lanes do in a submission.
+    fn record(&mut self, busy: &[usize]) -> Result<()> {
+        if !self.is_arranged {
+            self.arrange()?;
+        }
+        let mut with_old_depths = Vec::new();
+        for place in 0..self.kins.len() {
+            let group = self.kins[place].buffers.bind(self.pass.any_pipeline())?;
+            for (first_lane, &number) in (0..).zip(&self.kins[place].order) {
+                let lane = self.lane(number);
+                if lane.has_old_depths {
+                    let block_count = lane.plan.block_count() as u32;
+                    with_old_depths.push(OldDepths { group: Arc::clone(&group), first_lane, block_count });
+                }
+            }
+        }
+        self.pass.record_depths(&mut self.recorder, &with_old_depths)?;
+        let iterations = self.iterations(busy);
+        self.pass.record(&mut self.recorder, iterations)
+    }
+
+    fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
+        let tickets = lanes.iter().map(|&lane| self.ask_for(lane, Part::Flies)).collect::<Result<Vec<_>>>()?;
+        self.recorder.submit_and_wait()?;
+        tickets.iter().map(|ticket| self.take(ticket)).collect()
+    }
+}
+
+fn no_lane(lane: usize) -> ! {
+    panic!("lane {lane} was never admitted, or was dismissed")
+}
+
+impl SearchLanes for VulkanLanes {
+    fn admit(&mut self, course: Course, first: Option<&[Fly]>) -> Result<Option<usize>> {
+        state::check(&course)?;
+        let shape = CellShape::for_device(self.device.info(), &course)?;
+        self.admit_with_shape(course, first, shape)
+    }
+
+    fn dismiss(&mut self, lane: usize) {
+        if let Some(Lane { slices, course, variant, .. }) = self.lanes[lane].take() {
+            if let Some(kin) = self.kins.iter_mut().find(|kin| kin.variant == variant) {
+                kin.buffers.dismiss(&slices, &course.masks);
+            }
+            self.kins.retain(|kin| !kin.buffers.is_empty());
+            self.pass.disband();
+            self.is_arranged = false;
+        }
+    }
+
+    fn course(&self, lane: usize) -> &Course {
+        &self.lane(lane).course
+    }
+
+    fn standing(&self, lane: usize) -> Standing {
+        self.lane(lane).standing
+    }
+
+    fn load(&mut self, lane: usize, flies: &[Fly]) -> Result<()> {
+        self.begin(lane, Some(flies))
+    }
+
+    fn ask(&mut self, lane: usize, rounds: u32) -> Result<()> {
+        let Lane { wanted, has_failed, .. } = self.lane_mut(lane);
+        if *has_failed {
+            return Err(Error::Internal(format!("lane {lane} failed before and is asked for more")));
+        }
+        *wanted += rounds;
+        let wanted = *wanted;
+        let header = self.range(lane, Part::Header);
+        let field = std::mem::offset_of!(SearchHeader, wanted) as u64;
+        self.recorder.write_buffer(&header.buffer, header.offset + field, bytemuck::bytes_of(&wanted))
+    }
+
+    fn is_busy(&self, lane: usize) -> bool {
+        self.lane(lane).is_busy()
+    }
+
+    fn work(&mut self) -> Result<()> {
+        let busy: Vec<usize> = self.numbers().into_iter().filter(|&number| self.is_busy(number)).collect();
+        if busy.is_empty() {
+            return Ok(());
+        }
+        self.record(&busy)?;
+        let tickets = busy.iter().map(|&number| self.ask_for(number, Part::Header)).collect::<Result<Vec<_>>>()?;
+        self.recorder.submit_and_wait()?;
+        for lane in self.lanes.iter_mut().flatten() {
+            lane.has_old_depths = false;
+        }
+        for (number, ticket) in busy.into_iter().zip(tickets) {
+            let header = self.take::<SearchHeader>(&ticket)?[0];
+            self.lane_mut(number).absorb(&header);
+        }
+        Ok(())
+    }
+
+    fn failure(&mut self, lane: usize) -> Option<Error> {
+        self.lane_mut(lane).failure.take()
+    }
+
+    fn renormalise(&mut self, lanes: &[usize]) -> Result<()> {
+        let mut records = self.read_fly_records(lanes)?;
+        records.par_iter_mut().for_each(|records| {
+            let mut flies: Vec<Fly> = records.iter().map(FlyRecord::fly).collect();
+            depths::spread(&mut flies);
+            records.iter_mut().zip(&flies).for_each(|(record, fly)| record.z = fly.z);
+        });
+        for (&lane, records) in lanes.iter().zip(&records) {
+            self.write(lane, Part::Flies, bytemuck::cast_slice(records))?;
+            self.lane_mut(lane).has_old_depths = true;
+        }
+        Ok(())
+    }
+
+    fn read_back(&mut self, lane: usize) -> Result<SearchState> {
+        let [flies, steps, fitness] = [Part::Flies, Part::Steps, Part::Fitness].map(|part| self.ask_for(lane, part));
+        let (flies, steps, fitness) = (flies?, steps?, fitness?);
+        self.recorder.submit_and_wait()?;
+        let flies: Vec<FlyRecord> = self.take(&flies)?;
+        let fitness: Vec<i32> = self.take(&fitness)?;
+        Ok(SearchState {
+            flies: flies.iter().map(FlyRecord::fly).collect(),
+            steps: self.take(&steps)?,
+            fitness: fitness.into_iter().map(i64::from).collect(),
+        })
+    }
+
+    fn read_back_stacks(&mut self, lane: usize) -> Result<Stacks> {
+        let (pixels, stacks) = (self.ask_for(lane, Part::Pixels)?, self.ask_for(lane, Part::Stacks)?);
+        self.recorder.submit_and_wait()?;
+        let (pixels, words): (Vec<u32>, Vec<u32>) = (self.take(&pixels)?, self.take(&stacks)?);
+        let plan = &self.lane(lane).plan;
+        debug_assert_eq!(pixels.len(), plan.pixel_count() * PIXEL_WORDS);
+        Ok(state::stacks(plan, &pixels, &words))
+    }
+}

@@ -1,0 +1,11 @@
+//! The `cells` search on a Vulkan device. Twin: `cpu/cells/`, with the stages `glsl/cells*.comp`.
+
+mod buffers;
+mod lane;
+pub(super) mod lanes;
+pub mod layout;
+mod pass;
+mod plan;
+pub(super) mod search;
+pub(super) mod shape;
+mod state;

@@ -1,0 +1,290 @@
+//! The compute passes of the cells searches of all lanes: deal, scan, scatter, sort, then the steps of all cells, and
+//! for translucent tiles marginal fitness. Twin: `cpu/cells/`.
+//!
+//! A dispatch serves all lanes of a variant. The z of a workgroup is the lane that it works for; a workgroup that its
+//! lane does not need returns at once. Lanes of another variant have other buffers, so their dispatches need not wait
+//! for these.
+
+use std::sync::Arc;
+
+use super::layout::CellsPush;
+use super::plan::Plan;
+use super::shape::CellShape;
+use crate::error::Result;
+use crate::gpu::shaders;
+use crate::model::cells::Course;
+use crate::model::cells::rules::{BirthDepth, BirthKind};
+use crate::vk::{BindingGroup, BindingKind, ComputePass, ComputePipeline, ComputeShader, Device, Recorder};
+
+/// Invocations of a workgroup of the passes that work fly by fly or pixel by pixel.
+const ITEMS_PER_GROUP: u64 = 64;
+
+/// What the steps of cells are compiled for. Lanes with the same variant share their dispatches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Variant {
+    is_translucent: bool,
+    pub shape: CellShape,
+    /// Specialisation constants 2 to 8.
+    constants: [u32; 7],
+}
+
+impl Variant {
+    pub fn new(course: &Course, shape: CellShape) -> Self {
+        let rules = &course.rules;
+        Self {
+            is_translucent: course.is_translucent(),
+            shape,
+            constants: [
+                rules.color as u32,
+                u32::from(rules.births.kind == BirthKind::Mutant),
+                u32::from(rules.births.depth == BirthDepth::Random),
+                u32::from(rules.penalties.turn > 0),
+                u32::from(rules.bounds.local_size != 0),
+                u32::from(!course.is_plain()),
+                u32::from(rules.leash > 0),
+            ],
+        }
+    }
+
+    fn specialization(&self) -> Vec<(u32, u32)> {
+        let shape = [(0, self.shape.lanes), (1, self.shape.form as u32)];
+        shape.into_iter().chain((2..).zip(self.constants)).collect()
+    }
+}
+
+/// Lanes of one variant, and their buffers.
+pub(super) struct Team {
+    pub variant: Variant,
+    pub group: Arc<BindingGroup>,
+    /// In the order of their rules.
+    pub lanes: Vec<LaneSize>,
+}
+
+/// What decides how many workgroups a lane needs.
+pub(super) struct LaneSize {
+    fly_count: u64,
+    block_count: u64,
+    /// Most cells of a round.
+    cell_count: u64,
+}
+
+impl LaneSize {
+    pub fn new(plan: &Plan, fly_count: usize) -> Self {
+        Self { fly_count: fly_count as u64, block_count: plan.block_count(), cell_count: u64::from(plan.cell_count) }
+    }
+}
+
+/// A lane whose pixels hold depths that are out of date.
+pub(super) struct OldDepths {
+    pub group: Arc<BindingGroup>,
+    /// Its place in the order of rules.
+    pub first_lane: u32,
+    pub block_count: u32,
+}
+
+impl Team {
+    /// The most that any lane needs of something.
+    fn most(&self, of: impl Fn(&LaneSize) -> u64) -> u32 {
+        self.lanes.iter().map(of).max().unwrap_or(1).max(1) as u32
+    }
+}
+
+/// A shader for some of the lanes that share buffers, side by side in their order.
+struct Dispatch {
+    pipeline: Arc<ComputePipeline>,
+    group: Arc<BindingGroup>,
+    push: CellsPush,
+    lanes: u32,
+    /// Most workgroups that one of them needs.
+    workgroups: u32,
+}
+
+/// Dispatches that need not wait for each other, under the stem of their shader.
+struct Stage {
+    name: &'static str,
+    dispatches: Vec<Dispatch>,
+}
+
+impl Stage {
+    fn new(name: &'static str) -> Self {
+        Self { name, dispatches: Vec::new() }
+    }
+
+    /// Adds a dispatch for all lanes of a team, with the most workgroups that one of them needs.
+    fn add(&mut self, team: &Team, pipeline: &Arc<ComputePipeline>, workgroups: u32) {
+        self.dispatches.push(Dispatch {
+            pipeline: Arc::clone(pipeline),
+            group: Arc::clone(&team.group),
+            push: CellsPush { first_lane: 0, budget: team.variant.shape.budget },
+            lanes: team.lanes.len() as u32,
+            workgroups,
+        });
+    }
+}
+
+/// How many lanes a dispatch serves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Crowd {
+    One = 0,
+    Many = 1,
+}
+
+/// The pipelines for lanes of one variant.
+struct Steps {
+    variant: Variant,
+    crowd: Crowd,
+    cells: Arc<ComputePipeline>,
+    /// Only for translucent tiles, whose marginal fitness the cells leave: one sets it for each fly, and the other adds
+    /// what each pixel gives.
+    fitness: Option<[Arc<ComputePipeline>; 2]>,
+}
+
+/// The pipelines, and the stages of an iteration.
+pub(super) struct CellsPass {
+    device: Arc<Device>,
+    /// Deal, scan, scatter and sort.
+    dealing: [Arc<ComputePipeline>; 4],
+    depths: Arc<ComputePipeline>,
+    steps: Vec<Steps>,
+    stages: Vec<Stage>,
+}
+
+impl CellsPass {
+    pub fn create(device: &Arc<Device>) -> Result<Self> {
+        let create = |name, module| create_pipeline(device, name, module, &[]);
+        Ok(Self {
+            device: Arc::clone(device),
+            dealing: [
+                create("cells_deal", shaders::CELLS_DEAL)?,
+                create("cells_scan", shaders::CELLS_SCAN)?,
+                create("cells_scatter", shaders::CELLS_SCATTER)?,
+                create("cells_sort", shaders::CELLS_SORT)?,
+            ],
+            depths: create("cells_depths", shaders::CELLS_DEPTHS)?,
+            steps: Vec::new(),
+            stages: Vec::new(),
+        })
+    }
+
+    /// One of the pipelines, to bind buffers for: all have the same bindings.
+    pub fn any_pipeline(&self) -> &Arc<ComputePipeline> {
+        &self.depths
+    }
+
+    /// Drops the stages, and with them the buffers of all lanes, until [`CellsPass::arrange`].
+    pub fn disband(&mut self) {
+        self.stages.clear();
+    }
+
+    /// Prepares the stages for these lanes.
+    pub fn arrange(&mut self, teams: &[Team]) -> Result<()> {
+        const STEMS: [&str; 4] = ["cells_deal", "cells_scan", "cells_scatter", "cells_sort"];
+        let mut stages: Vec<Stage> = STEMS.map(Stage::new).into();
+        const STEPS: [&str; 4] = ["cells", "cells_glazed", "cells_fitness", "cells_fitness"];
+        let mut steps = STEPS.map(Stage::new);
+        for team in teams {
+            let flies = team.most(|lane| lane.fly_count.div_ceil(ITEMS_PER_GROUP));
+            let pixels = team.most(|lane| lane.block_count);
+            for ((stage, pipeline), workgroups) in stages.iter_mut().zip(&self.dealing).zip([flies, 1, flies, flies]) {
+                stage.add(team, pipeline, workgroups);
+            }
+            let crowd = if team.lanes.len() == 1 { Crowd::One } else { Crowd::Many };
+            let Steps { cells, fitness, .. } = self.steps_of(team.variant, crowd)?;
+            let step = usize::from(team.variant.is_translucent);
+            steps[step].add(team, cells, team.most(|lane| lane.cell_count));
+            if let Some([begin, add]) = fitness {
+                steps[2].add(team, begin, flies);
+                steps[3].add(team, add, pixels);
+            }
+        }
+        stages.extend(steps);
+        stages.retain(|stage| !stage.dispatches.is_empty());
+        self.stages = stages;
+        Ok(())
+    }
+
+    fn steps_of(&mut self, variant: Variant, crowd: Crowd) -> Result<&Steps> {
+        let place = self.steps.iter().position(|steps| (steps.variant, steps.crowd) == (variant, crowd));
+        if place.is_none() {
+            self.steps.push(Steps::create(&self.device, variant, crowd)?);
+        }
+        Ok(&self.steps[place.unwrap_or(self.steps.len() - 1)])
+    }
+
+    /// Records the pass that brings the depths of pixels up to date.
+    pub fn record_depths(&self, recorder: &mut Recorder, lanes: &[OldDepths]) -> Result<()> {
+        if lanes.is_empty() {
+            return Ok(());
+        }
+        let mut pass = recorder.compute_pass("cells_depths")?;
+        for OldDepths { group, first_lane, block_count } in lanes {
+            let dispatch = Dispatch {
+                pipeline: Arc::clone(&self.depths),
+                group: Arc::clone(group),
+                push: CellsPush { first_lane: *first_lane, budget: 0 },
+                lanes: 1,
+                workgroups: *block_count,
+            };
+            self.dispatch(&mut pass, &dispatch);
+        }
+        Ok(())
+    }
+
+    /// Records so many iterations. Each begins a round in every lane that wants one and has none under way, and takes
+    /// each cell as far as the budget allows.
+    pub fn record(&self, recorder: &mut Recorder, iterations: u32) -> Result<()> {
+        for _ in 0..iterations {
+            for stage in &self.stages {
+                let mut pass = recorder.compute_pass(stage.name)?;
+                for dispatch in &stage.dispatches {
+                    self.dispatch(&mut pass, dispatch);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn dispatch(&self, pass: &mut ComputePass<'_>, dispatch: &Dispatch) {
+        pass.bind(&dispatch.pipeline, &dispatch.group);
+        pass.push_constants(bytemuck::bytes_of(&dispatch.push));
+        let columns = dispatch.workgroups.min(self.device.info().limits.workgroups[0]);
+        pass.dispatch(columns, dispatch.workgroups.div_ceil(columns), dispatch.lanes);
+    }
+}
+
+impl Steps {
+    fn create(device: &Arc<Device>, variant: Variant, crowd: Crowd) -> Result<Self> {
+        let constants = [variant.specialization(), vec![(10, crowd as u32)]].concat();
+        let fitness = |part: u32| {
+            let constants = [&constants[..], &[(9, part)]].concat();
+            create_pipeline(device, "cells_fitness", shaders::CELLS_FITNESS, &constants)
+        };
+        let is_translucent = variant.is_translucent;
+        let (name, module) =
+            if is_translucent { ("cells_glazed", shaders::CELLS_GLAZED) } else { ("cells", shaders::CELLS) };
+        Ok(Self {
+            variant,
+            crowd,
+            cells: create_pipeline(device, name, module, &constants)?,
+            fitness: if is_translucent { Some([fitness(0)?, fitness(1)?]) } else { None },
+        })
+    }
+}
+
+fn create_pipeline(
+    device: &Arc<Device>,
+    name: &str,
+    module: &[u8],
+    specialization: &[(u32, u32)],
+) -> Result<Arc<ComputePipeline>> {
+    ComputePipeline::create(
+        device,
+        &ComputeShader {
+            name,
+            spirv: &shaders::words(module),
+            specialization,
+            bindings: &[BindingKind::StorageBuffer; 14],
+            push_constant_bytes: size_of::<CellsPush>() as u32,
+        },
+    )
+}

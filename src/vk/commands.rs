@@ -1,0 +1,109 @@
+//! Command buffers: their pool, their beginning and end, the barriers in them, and running a few of them at once
+//! without a recorder.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::handle::Owned;
+use super::scope::{self, Scope};
+use super::{Device, call_failed, refused};
+use crate::error::{Error, Result};
+
+/// Records the barrier between two kinds of work.
+pub(super) fn record_barrier(device: &Device, commands: vk::CommandBuffer, previous: Scope, next: Scope) {
+    let barriers = [scope::barrier(previous, next)];
+    let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
+    // SAFETY: V1, V3, V5.
+    unsafe { device.raw().cmd_pipeline_barrier2(commands, &dependency) };
+}
+
+/// Creates a command pool whose buffers are reset together.
+pub(super) fn create_command_pool(device: &Arc<Device>, name: &str) -> Result<Owned<vk::CommandPool>> {
+    let info = vk::CommandPoolCreateInfo::default()
+        .flags(vk::CommandPoolCreateFlags::TRANSIENT)
+        .queue_family_index(device.queue_family());
+    // SAFETY: V1.
+    let pool = unsafe { device.raw().create_command_pool(&info, None) }
+        .map_err(|result| call_failed(format!("creation of command pool {name}"), result))?;
+    Ok(Owned::new(device, pool, name))
+}
+
+/// Takes `COUNT` command buffers from a pool, which owns them.
+pub(super) fn allocate_command_buffers<const COUNT: usize>(
+    pool: &Owned<vk::CommandPool>,
+) -> Result<[vk::CommandBuffer; COUNT]> {
+    let info = vk::CommandBufferAllocateInfo::default().command_pool(pool.get()).command_buffer_count(COUNT as u32);
+    // SAFETY: V1.
+    let buffers = unsafe { pool.device().raw().allocate_command_buffers(&info) }
+        .map_err(|result| call_failed("vkAllocateCommandBuffers", result))?;
+    buffers.try_into().map_err(|_| refused("vkAllocateCommandBuffers", "fewer buffers than asked for"))
+}
+
+/// Starts the recording of a command buffer that is submitted once.
+pub(super) fn begin_commands(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
+    let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+    // SAFETY: V1, V2, V3.
+    unsafe { device.raw().begin_command_buffer(commands, &info) }
+        .map_err(|result| call_failed("vkBeginCommandBuffer", result))
+}
+
+/// Ends the recording of a command buffer.
+pub(super) fn end_commands(device: &Device, commands: vk::CommandBuffer) -> Result<()> {
+    // SAFETY: V1, V3.
+    unsafe { device.raw().end_command_buffer(commands) }.map_err(|result| call_failed("vkEndCommandBuffer", result))
+}
+
+/// Records and runs a few commands without a recorder, for preparations that happen once.
+pub(super) fn run_once(device: &Arc<Device>, name: &str, record: impl FnOnce(vk::CommandBuffer)) -> Result<()> {
+    let pool = create_command_pool(device, name)?;
+    let [commands] = allocate_command_buffers(&pool)?;
+    device.set_name(commands, name);
+    begin_commands(device, commands)?;
+    record(commands);
+    end_commands(device, commands)?;
+    let infos = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+    let submits = [vk::SubmitInfo2::default().command_buffer_infos(&infos)];
+    let failed = |call: &str, result| submission_failed(call, result, name);
+    let queue = device.queue();
+    // SAFETY: V1, V2, V3: the pool is dropped after the queue is idle.
+    unsafe {
+        device
+            .raw()
+            .queue_submit2(*queue, &submits, vk::Fence::null())
+            .map_err(|result| failed("vkQueueSubmit2", result))?;
+        device.raw().queue_wait_idle(*queue).map_err(|result| failed("vkQueueWaitIdle", result))
+    }
+}
+
+/// The error of a failed submission. A lost device and full memory have variants of their own; both name the last pass.
+pub(super) fn submission_failed(call: &str, result: vk::Result, last_pass: &str) -> Error {
+    match result {
+        vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { last_pass: last_pass.to_owned() },
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+            Error::OutOfMemory { call: format!("{call} after pass {last_pass}") }
+        }
+        other => call_failed(format!("{call} after pass {last_pass}"), other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lost_device_is_told_with_the_last_pass() {
+        let lost = submission_failed("vkQueueSubmit2", vk::Result::ERROR_DEVICE_LOST, "evaluate");
+        assert!(matches!(&lost, Error::DeviceLost { last_pass } if last_pass == "evaluate"));
+        let other = submission_failed("vkQueueSubmit2", vk::Result::ERROR_UNKNOWN, "evaluate");
+        assert!(other.to_string().contains("vkQueueSubmit2 after pass evaluate"), "{other}");
+    }
+
+    #[test]
+    fn full_memory_is_told_with_the_last_pass() {
+        for result in [vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_OUT_OF_HOST_MEMORY] {
+            let full = submission_failed("vkWaitForFences", result, "evaluate");
+            assert!(matches!(&full, Error::OutOfMemory { call } if call.contains("pass evaluate")), "{full}");
+        }
+    }
+}
