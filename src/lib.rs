@@ -84,6 +84,8 @@ pub use error::{Error, NoDevice, Remedy, Result};
 #[doc(inline)]
 pub use evolve::{ColorMode, OnDry, StopReason};
 #[doc(inline)]
+pub use model::fly::Genes;
+#[doc(inline)]
 pub use model::{Backdrop, Blend, Fly, Grout, MaskSet, Population, Rgb};
 #[doc(inline)]
 pub use shapes::Shader;

@@ -86,6 +86,7 @@ impl MaskSet {
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more than [`MASK_LAYERS_MAX`] layers.
+    #[doc(hidden)]
     pub fn with_layers(others: Vec<Mask>) -> Result<Self> {
         if others.len() >= MASK_LAYERS_MAX {
             return Err(Error::parameter(
@@ -112,6 +113,7 @@ impl MaskSet {
 
     /// All layers; the first is the square.
     #[must_use]
+    #[doc(hidden)]
     pub fn layers(&self) -> &[Mask] {
         &self.layers
     }
