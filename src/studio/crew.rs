@@ -22,11 +22,12 @@ use crate::vk::DeviceKind;
 const LANES: (usize, usize) = (256, 16);
 
 /// Makes many mosaics. `done` is called with the number of a picture, from 0, and what became of it, as pictures end:
-/// in any order. When it returns false, all work ends. Each mosaic has the bytes that [`Recipe::make`] gives it, whatever
-/// else is made beside it. A picture that fails does not stop the others.
+/// in any order. When it returns false, all work ends. Each mosaic has the bytes that [`Recipe::make`] gives it,
+/// whatever else is made beside it. A picture that fails does not stop the others.
 ///
-/// `tasks` gives pictures as they are needed: one for each thread of the CPU, up to 256 that share a device. So a folder
-/// of any size can be made; `tasks` must not wait for `done`. An error in the place of a picture is handed to `done`.
+/// `tasks` gives pictures as they are needed: one for each thread of the CPU, up to 256 that share a device. So a
+/// folder of any size can be made; `tasks` must not wait for `done`. An error in the place of a picture is handed to
+/// `done`.
 ///
 /// # Errors
 /// If the device fails, which ends all.

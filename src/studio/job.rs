@@ -221,8 +221,8 @@ impl Job {
         Some(begin_from(&scheme, self.wearable(population)))
     }
 
-    /// The flies of a population; absent ones, which nobody dresses, wear squares where their masks are not those of the
-    /// job.
+    /// The flies of a population; absent ones, which nobody dresses, wear squares where their masks are not those of
+    /// the job.
     fn wearable(&self, population: &Population) -> Vec<Fly> {
         let layer_count = self.masks().layers().len();
         let mut flies = population.flies.clone();

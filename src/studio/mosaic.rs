@@ -137,8 +137,8 @@ impl Mosaic {
         Ok(Image { width_px, height_px, pixels, alpha })
     }
 
-    /// The same mosaic drawn with a longer side of `long_side_px`, 1 to 65,535 px, from the tiles: sharp at any size. This
-    /// takes about 10 bytes of memory for each pixel, 16 if it is transparent.
+    /// The same mosaic drawn with a longer side of `long_side_px`, 1 to 65,535 px, from the tiles: sharp at any size.
+    /// This takes about 10 bytes of memory for each pixel, 16 if it is transparent.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] if the size is out of range; or if the device fails.

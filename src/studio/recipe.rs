@@ -118,8 +118,8 @@ numbers! {
         /// Births of the paper's scheme that are evaluated together, 1 to the number of tiles; 1, the default, is the
         /// published algorithm.
         batch_births, 1, FLY_COUNT_MAX as u64;
-        /// Further runs of the paper's scheme, each from the best population so far, 0 to 1,000,000. By default 0, or as
-        /// the preset has it.
+        /// Further runs of the paper's scheme, each from the best population so far, 0 to 1,000,000. By default 0, or
+        /// as the preset has it.
         restarts, 0, 1_000_000;
         /// Begin the paper's scheme with N / 2^M tiles, each of which splits in two at each of the first M restarts, 0
         /// to 20. By default 0.

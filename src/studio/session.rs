@@ -90,14 +90,14 @@ impl<'d> Session<'d> {
     }
 
     /// Changes the recipe and goes on from the present tiles: a search takes new bounds, penalties, grout, colours,
-    /// masks, weights, seed and budget from here on. Tiles are held to the new bounds, and step sizes are learnt anew. An
-    /// `init` of the recipe only tells the number of tiles, and masks and background where the recipe names none.
+    /// masks, weights, seed and budget from here on. Tiles are held to the new bounds, and step sizes are learnt anew.
+    /// An `init` of the recipe only tells the number of tiles, and masks and background where the recipe names none.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] if the recipe is wrong, or if it needs a new beginning: another number of tiles,
-    /// another size of the picture, another scheme, or any change in the paper's scheme; [`crate::Error::Input`] about a
-    /// file that it names; or if the device has no room for the new search beside the old one. Then the session goes on
-    /// as before.
+    /// another size of the picture, another scheme, or any change in the paper's scheme; [`crate::Error::Input`] about
+    /// a file that it names; or if the device has no room for the new search beside the old one. Then the session goes
+    /// on as before.
     pub fn change(&mut self, recipe: &Recipe) -> Result<()> {
         let (settings, mut job) = recipe.job(&self.picture)?;
         let size = |job: &Job| (job.target.width_px(), job.target.height_px());

@@ -35,6 +35,9 @@ const RESERVED: [(&[&str], &[&str], &str); 4] = [
 /// Longer than this and a file is two files.
 const LINES_MAX: usize = 450;
 
+/// As `max_width` in rustfmt.toml, which leaves comments alone.
+const COLUMNS_MAX: usize = 120;
+
 /// The names at the start of `tree`, what follows `crate::`: one, or each of `{a, b::c, d::{e, f}}`.
 fn first_names(tree: &str) -> Vec<String> {
     let name = |text: &str| text.trim_start().chars().take_while(|&char| is_word_char(char)).collect();
@@ -172,6 +175,18 @@ fn no_source_file_is_too_long_to_read_at_once() {
         .filter(|(_, lines)| *lines > LINES_MAX)
         .map(|(path, lines)| format!("{} has {lines} lines, more than {LINES_MAX}; split it by topic", path.display()))
         .collect();
+    assert_none(&complaints);
+}
+
+#[test]
+fn no_comment_is_wider_than_the_code() {
+    let is_wide = |line: &&str| line.trim_start().starts_with("//") && line.chars().count() > COLUMNS_MAX;
+    let mut complaints = Vec::new();
+    for source in sources() {
+        for line in source.text.lines().filter(is_wide) {
+            complaints.push(format!("{}: `{line}` is wider than {COLUMNS_MAX} columns", source.path.display()));
+        }
+    }
     assert_none(&complaints);
 }
 
