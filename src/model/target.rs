@@ -45,8 +45,9 @@ impl Target {
                 format!("its sides must be 1 to {TARGET_SIDE_MAX_PX} px, not {width_px}x{height_px}"),
             ));
         }
-        check_count((width_px, height_px), pixels.len(), ("picture", "pixels"))?;
-        Ok(Self { width_px, height_px, pixels, weights: None, transparent: None })
+        let target = Self { width_px, height_px, pixels, weights: None, transparent: None };
+        target.check_count("picture", "pixels", target.pixels.len())?;
+        Ok(target)
     }
 
     /// The same pixels, with the error of each multiplied by its weight, 1 to [`WEIGHT_MAX`], row by row from the top.
@@ -57,7 +58,7 @@ impl Target {
     /// # Errors
     /// [`Error::Parameter`] if their count does not fit the size, or if one is out of range.
     pub fn with_weights(mut self, mut weights: Vec<u8>) -> Result<Self> {
-        check_count((self.width_px, self.height_px), weights.len(), ("weights", "weights"))?;
+        self.check_count("weights", "weights", weights.len())?;
         if let Some(wrong) = weights.iter().find(|weight| !(1..=WEIGHT_MAX).contains(*weight)) {
             return Err(Error::parameter("weights", format!("each must be 1 to {WEIGHT_MAX}, not {wrong}")));
         }
@@ -73,11 +74,7 @@ impl Target {
     /// # Errors
     /// [`Error::Parameter`] if their count does not fit the size.
     pub fn with_transparent(mut self, transparent: Vec<bool>) -> Result<Self> {
-        check_count(
-            (self.width_px, self.height_px),
-            transparent.len(),
-            ("transparent", "pixels that are transparent or not"),
-        )?;
+        self.check_count("transparent", "pixels that are transparent or not", transparent.len())?;
         self.transparent = Some(transparent).filter(|transparent| transparent.contains(&true));
         Ok(self)
     }
@@ -112,13 +109,15 @@ impl Target {
     pub fn transparent(&self) -> Option<&[bool]> {
         self.transparent.as_deref()
     }
-}
 
-fn check_count((width_px, height_px): (u32, u32), count: usize, (name, what): (&str, &str)) -> Result<()> {
-    if count == width_px as usize * height_px as usize {
-        return Ok(());
+    /// Checks that there is one value for each pixel: `count` of what `plural` names, for the parameter `name`.
+    fn check_count(&self, name: &str, plural: &str, count: usize) -> Result<()> {
+        let Self { width_px, height_px, .. } = self;
+        if count == *width_px as usize * *height_px as usize {
+            return Ok(());
+        }
+        Err(Error::parameter(name, format!("a picture of {width_px}x{height_px} px cannot have {count} {plural}")))
     }
-    Err(Error::parameter(name, format!("a picture of {width_px}x{height_px} px cannot have {count} {what}")))
 }
 
 fn greatest_common_divisor(a: u8, b: u8) -> u8 {

@@ -4,13 +4,12 @@ use std::sync::Arc;
 
 use smalti::cpu::CpuEvaluator;
 use smalti::cpu::cells::CpuSearch;
-use smalti::evolve::style::{GuideKind, Style};
-use smalti::guide;
 use smalti::model::cells::pixel::STACK_DEPTH;
-use smalti::model::cells::{Course, Search};
+use smalti::model::cells::{Course, Rules, Search};
 use smalti::model::mask::Texel;
-use smalti::model::operators::tile_side;
+use smalti::model::tile::pack;
 use smalti::model::{Evaluator, Fly, Mask, MaskSet, Scene, Target};
+use smalti::studio::{Recipe, work};
 
 /// A red star-like shape on white: flat areas in which like tiles pile up.
 pub fn graphic(width_px: u32, height_px: u32) -> Target {
@@ -30,20 +29,16 @@ pub fn photograph(width_px: u32, height_px: u32) -> Target {
 }
 
 /// A course of the style over `target`, with masks that have holes and shades if the style wears any.
-pub fn course(style: &Style, target: Target, fly_count: usize) -> Course {
-    let side = tile_side(target.width_px(), target.height_px(), fly_count);
-    let guide = match style.guide {
-        GuideKind::Edges => guide::sharp(&target),
-        GuideKind::Flow { smoothing_q8, size_strength_q8 } => {
-            let smoothing = (side * smoothing_q8) >> 8;
-            guide::flowing(&target, &guide::Flow { tile_side: side, smoothing, size_strength_q8, weights: None })
-        }
-    };
-    let mut rules = style.rules(7, side, fly_count, [90, 80, 70], [60, 50, 40]);
-    let masks = if style.masks.is_empty() { MaskSet::default() } else { holed_masks() };
-    (rules.mask_first, rules.mask_count) =
-        (1.min(masks.layers().len() as u32 - 1), masks.layers().len().max(2) as u32 - 1);
-    Course { rules, guide: Arc::new(guide), target: Arc::new(target), masks: Arc::new(masks), fly_count }
+pub fn course(style: &str, target: Target, fly_count: usize) -> Course {
+    let recipe = Recipe::named(style).expect("it is a style").tiles(fly_count as u64).seed(7);
+    let mut course = work(&Arc::new(target), &recipe).expect("the recipe is right").course;
+    course.rules.background = pack([90, 80, 70]);
+    if course.masks.layers().len() == 1 {
+        return course;
+    }
+    let masks = Arc::new(holed_masks());
+    let (mask_first, mask_count) = (1, masks.layers().len() as u32 - 1);
+    Course { rules: Rules { mask_first, mask_count, ..course.rules }, masks, ..course }
 }
 
 fn holed_masks() -> MaskSet {
@@ -65,16 +60,16 @@ fn courses() -> Vec<(&'static str, Course)> {
             .and_then(|target| target.with_transparent(transparent))
             .expect("planes of its size")
     };
-    let mut several = course(&Style::free(), photograph(97, 83), 150);
+    let mut several = course("free", photograph(97, 83), 150);
     several.rules.candidates = 8;
     vec![
-        ("free on a photo", course(&Style::free(), photograph(96, 90), 160)),
-        ("free on a graphic", course(&Style::free(), graphic(96, 90), 160)),
+        ("free on a photo", course("free", photograph(96, 90), 160)),
+        ("free on a graphic", course("free", graphic(96, 90), 160)),
         ("free with eight candidates", several),
-        ("mosaic", course(&Style::mosaic(), photograph(110, 75), 140)),
-        ("paint", course(&Style::paint(), photograph(90, 96), 120)),
-        ("weights and transparency", course(&Style::free(), weighed(photograph(96, 70)), 130)),
-        ("many weighed tiles with grout", course(&Style::mosaic(), weighed(graphic(130, 61)), 220)),
+        ("mosaic", course("mosaic", photograph(110, 75), 140)),
+        ("paint", course("paint", photograph(90, 96), 120)),
+        ("weights and transparency", course("free", weighed(photograph(96, 70)), 130)),
+        ("many weighed tiles with grout", course("mosaic", weighed(graphic(130, 61)), 220)),
     ]
 }
 
@@ -114,7 +109,7 @@ fn after_every_round_the_state_is_that_of_a_fresh_evaluation_and_the_objective_n
 #[test]
 fn in_free_the_objective_is_the_sae_and_the_marginal_fitness_that_of_the_evaluator() {
     for target in [photograph(120, 100), graphic(100, 120)] {
-        let course = course(&Style::free(), target, 200);
+        let course = course("free", target, 200);
         let scene = Scene {
             target: Arc::clone(&course.target),
             masks: Arc::clone(&course.masks),
@@ -151,7 +146,7 @@ fn leaving_out_any_fly_costs_its_marginal_fitness_in_every_style() {
 
 #[test]
 fn like_tiles_on_a_flat_picture_open_no_holes_and_end_in_a_perfect_likeness() {
-    let mut search = CpuSearch::new(course(&Style::free(), graphic(128, 128), 400));
+    let mut search = CpuSearch::new(course("free", graphic(128, 128), 400));
     let mut last = i64::MAX;
     for _ in 0..30 {
         search.advance(4).expect("the twin works");
@@ -165,7 +160,7 @@ fn like_tiles_on_a_flat_picture_open_no_holes_and_end_in_a_perfect_likeness() {
 
 #[test]
 fn flies_that_would_stack_too_deep_become_absent_and_the_others_are_as_they_were() {
-    let course = course(&Style::free(), photograph(64, 64), 60);
+    let course = course("free", photograph(64, 64), 60);
     let fly = |index: u32| Fly {
         x: 30 * 64,
         y: 30 * 64,
@@ -191,7 +186,7 @@ fn flies_that_would_stack_too_deep_become_absent_and_the_others_are_as_they_were
 
 #[test]
 fn a_fly_between_the_pixels_becomes_absent_and_is_born_again() {
-    let course = course(&Style::free(), photograph(64, 64), 12);
+    let course = course("free", photograph(64, 64), 12);
     let between = Fly { x: 30 * 64 + 32, y: 30 * 64 + 32, w: 16, h: 16, alive: true, ..Fly::ABSENT };
     let seen = Fly { x: 20 * 64, y: 9 * 64, z: 9, w: 4_000, h: 3_000, ..between };
     let mut flies = vec![between; 12];
@@ -223,8 +218,8 @@ fn the_state_does_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn flies_obey_the_bounds_of_their_style() {
-    for style in [Style::mosaic(), Style::paint()] {
-        let course = course(&style, photograph(120, 120), 200);
+    for style in ["mosaic", "paint"] {
+        let course = course(style, photograph(120, 120), 200);
         let mut search = CpuSearch::new(course.clone());
         search.advance(12).expect("the twin works");
         let flies = search.read_back().expect("the twin works").flies;

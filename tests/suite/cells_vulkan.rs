@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use smalti::cpu::cells::CpuSearch;
 use smalti::gpu::{CellForm, CellShape, VulkanSearch};
-use smalti::guide;
 use smalti::model::cells::rules::{Acceptance, BirthDepth, BirthKind, Bounds, Class, ColorSource};
 use smalti::model::cells::{Course, Penalties, Rules, Search};
-use smalti::model::{Fly, MaskSet, Target};
+use smalti::model::{Fly, Target};
+use smalti::studio::{Recipe, work};
 use smalti::vk::{Device, DeviceOptions};
 
 use crate::canary;
@@ -32,13 +32,13 @@ pub fn parrots(x0: u32, y0: u32, width_px: u32, height_px: u32) -> Target {
     Target::new(width_px, height_px, (0..width_px * height_px).map(pixel).collect()).expect("the size is right")
 }
 
+/// A course of the style `free`, changed.
 pub fn course(target: Target, fly_count: usize, change: impl FnOnce(&mut Rules)) -> Course {
-    let area = f64::from(target.width_px()) * f64::from(target.height_px());
-    let side = (64.0 * (area / fly_count as f64).sqrt()) as u32;
-    let mut rules = Rules::free(7, side, fly_count, [0; 3]);
-    change(&mut rules);
-    let guide = Arc::new(guide::sharp(&target));
-    Course { rules, target: Arc::new(target), guide, masks: Arc::new(MaskSet::default()), fly_count }
+    let recipe = Recipe::new().tiles(fly_count as u64).seed(7);
+    let mut course = work(&Arc::new(target), &recipe).expect("the recipe is right").course;
+    course.rules.background = 0;
+    change(&mut course.rules);
+    course
 }
 
 pub fn narrow(device: &Device) -> CellShape {
@@ -49,11 +49,19 @@ const WIDE: CellShape = CellShape { lanes: 32, form: CellForm::Wide, budget: 60_
 
 /// Goes through the rounds on both, one by one, and evens out the depths every two.
 fn check_rounds(device: &Arc<Device>, course: &Course, shape: CellShape, rounds: u32) {
-    check_named_rounds(device, ("plain", course), shape, rounds);
+    check_named_rounds(device, Named { name: "plain", course }, shape, rounds);
+}
+
+/// A course and what it is called where it fails.
+#[derive(Clone, Copy)]
+pub struct Named<'a> {
+    pub name: &'a str,
+    pub course: &'a Course,
 }
 
 /// As [`check_rounds`], of a course with a name.
-pub fn check_named_rounds(device: &Arc<Device>, (name, course): (&str, &Course), shape: CellShape, rounds: u32) {
+pub fn check_named_rounds(device: &Arc<Device>, named: Named<'_>, shape: CellShape, rounds: u32) {
+    let Named { name, course } = named;
     let mut twin = CpuSearch::new(course.clone());
     let mut search = VulkanSearch::with_shape(device, course.clone(), shape).expect("it fits");
     if course.rules.births.kind == BirthKind::Mutant {
@@ -203,7 +211,7 @@ pub fn courses() -> Vec<(&'static str, Course)> {
 fn every_rule_of_every_style_comes_to_the_twins_state() {
     canary::with_device(&DeviceOptions::default(), |device| {
         for (name, course) in courses() {
-            check_named_rounds(&device, (name, &course), narrow(&device), 3);
+            check_named_rounds(&device, Named { name, course: &course }, narrow(&device), 3);
         }
         let (_, course) = &courses()[4];
         check_rounds(&device, course, WIDE, 3);

@@ -4,18 +4,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 use smalti::cpu::cells::CpuSearch;
-use smalti::evolve::style::Style;
 use smalti::gpu::{CellForm, CellShape, VulkanSearch};
-use smalti::guide;
 use smalti::model::Target;
 use smalti::model::cells::pixel::TRANSLUCENT_DEPTH;
 use smalti::model::cells::rules::{Acceptance, BirthDepth, BirthKind, ColorSource};
 use smalti::model::cells::{Course, Rules, Search};
-use smalti::model::operators::tile_side;
+use smalti::model::tile::pack;
+use smalti::studio::{Recipe, work};
 use smalti::vk::{Device, DeviceOptions};
 
 use crate::canary;
-use crate::cells_vulkan::check_named_rounds;
+use crate::cells_vulkan::{Named, check_named_rounds};
 use crate::scenarios::{stream, translucent_masks};
 
 const BACKGROUND: [u8; 3] = [90, 20, 160];
@@ -56,13 +55,13 @@ fn uneven(target: Target) -> Target {
 
 /// Tiles of the style `spray` in masks of noise, of a soft disc and of the faintest veil, with shades and holes.
 fn course(target: Target, fly_count: usize, change: impl FnOnce(&mut Rules)) -> Course {
-    let side = tile_side(target.width_px(), target.height_px(), fly_count);
+    let recipe = Recipe::spray().tiles(fly_count as u64).seed(7);
+    let course = work(&Arc::new(target), &recipe).expect("the recipe is right").course;
     let masks = translucent_masks(&mut stream(5));
-    let mut rules = Style::spray().rules(7, side, fly_count, BACKGROUND, BACKGROUND);
-    (rules.mask_first, rules.mask_count) = (0, masks.layers().len() as u32);
+    let mask_count = masks.layers().len() as u32;
+    let mut rules = Rules { background: pack(BACKGROUND), mask_first: 0, mask_count, ..course.rules };
     change(&mut rules);
-    let guide = Arc::new(guide::sharp(&target));
-    Course { rules, target: Arc::new(target), guide, masks: Arc::new(masks), fly_count }
+    Course { rules, masks: Arc::new(masks), ..course }
 }
 
 fn narrow(device: &Device) -> CellShape {
@@ -78,8 +77,8 @@ fn sprayed_pictures_come_to_the_twins_state_after_every_round_in_narrow_and_wide
             let photo = course(parrots(101, 75), 150, |rules| rules.candidates = candidates);
             let graphic = course(flat(70, 93), 90, |rules| rules.candidates = candidates);
             for (name, course) in [("a photo", &photo), ("a graphic", &graphic)] {
-                check_named_rounds(&device, (name, course), narrow(&device), rounds);
-                check_named_rounds(&device, (name, course), WIDE, 2);
+                check_named_rounds(&device, Named { name, course }, narrow(&device), rounds);
+                check_named_rounds(&device, Named { name, course }, WIDE, 2);
             }
         }
     });
@@ -124,10 +123,10 @@ pub fn courses() -> Vec<(&'static str, Course)> {
 fn every_rule_for_translucent_tiles_comes_to_the_twins_state() {
     canary::with_device(&DeviceOptions::default(), |device| {
         for (name, course) in &courses() {
-            check_named_rounds(&device, (name, course), narrow(&device), 3);
+            check_named_rounds(&device, Named { name, course }, narrow(&device), 3);
         }
         let (name, course) = &courses()[0];
-        check_named_rounds(&device, (name, course), WIDE, 2);
+        check_named_rounds(&device, Named { name, course }, WIDE, 2);
     });
 }
 
@@ -142,7 +141,7 @@ fn stacks_that_are_full_refuse_the_same_children() {
     let deepest = twin.read_back_stacks().expect("the twin works").pixels.iter().map(Vec::len).max();
     assert_eq!(deepest, Some(TRANSLUCENT_DEPTH));
     canary::with_device(&DeviceOptions::default(), |device| {
-        check_named_rounds(&device, ("full stacks", &course), narrow(&device), 3);
+        check_named_rounds(&device, Named { name: "full stacks", course: &course }, narrow(&device), 3);
     });
 }
 
@@ -151,7 +150,12 @@ fn a_small_budget_takes_more_dispatches_of_glazed_cells_and_a_tiny_one_is_an_err
     let course = course(flat(64, 64), 40, |_| {});
     canary::with_device(&DeviceOptions::default(), |device| {
         for shape in [narrow(&device), WIDE] {
-            check_named_rounds(&device, ("a small budget", &course), CellShape { budget: 25_000, ..shape }, 2);
+            check_named_rounds(
+                &device,
+                Named { name: "a small budget", course: &course },
+                CellShape { budget: 25_000, ..shape },
+                2,
+            );
             let tiny = CellShape { budget: 150, ..shape };
             let mut search = VulkanSearch::with_shape(&device, course.clone(), tiny).expect("it fits");
             let error = search.advance(3).expect_err("a step cannot fit").to_string();

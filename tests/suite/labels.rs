@@ -5,11 +5,10 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use smalti::evolve::evolution::random_population;
-use smalti::evolve::style::Style;
 use smalti::gpu::{GpuEvaluator, GpuPainter, VulkanSearch};
-use smalti::guide;
-use smalti::model::cells::{Course, Search};
+use smalti::model::cells::{Course, Rules, Search};
 use smalti::model::{Blend, Canvas, Evaluator, MaskSet, Painter, Population, Scene, Target};
+use smalti::studio::{Recipe, work};
 use smalti::vk::{ClockMethod, Device, DeviceOptions, PassTime, Staging, Submission, SubmissionObserver, Timing};
 
 use crate::canary;
@@ -71,11 +70,10 @@ fn evaluate_and_draw(device: &Arc<Device>, masks: MaskSet) {
 }
 
 fn search(device: &Arc<Device>, masks: MaskSet) {
-    let target = target();
-    let guide = Arc::new(guide::sharp(&target));
-    let style = Style::named(if masks.blend() == Blend::Opaque { "free" } else { "spray" }).expect("it is a style");
-    let rules = style.rules(7, 400, 40, [0; 3], [0; 3]);
-    let course = Course { rules, target, guide, masks: Arc::new(masks), fly_count: 40 };
+    let recipe = if masks.blend() == Blend::Opaque { Recipe::new() } else { Recipe::spray() }.tiles(40);
+    let course = work(&target(), &recipe).expect("the recipe is right").course;
+    let rules = Rules { mask_first: 0, mask_count: masks.layers().len() as u32, ..course.rules };
+    let course = Course { rules, masks: Arc::new(masks), ..course };
     let mut search = VulkanSearch::new(device, course).expect("it fits");
     search.advance(3).expect("the device works");
     search.renormalise().expect("the device works");

@@ -199,7 +199,7 @@ fn jobs() -> Vec<(Course, Option<Vec<Fly>>, Budget)> {
     let far = Budget { evals: u64::MAX, target_sae: None, patience: None };
     jobs.push((plain(), None, evals(0)));
     jobs.push((plain(), None, Budget { target_sae: Some(400_000), ..far }));
-    jobs.push((plain(), None, Budget { patience: Some(3_000), evals: 60_000, ..far }));
+    jobs.push((plain(), None, Budget { patience: Some(2_000), evals: 60_000, ..far }));
     jobs.push((course(star(40, 40), 30, |rules| rules.steps_per_fly = 0), None, far));
     jobs.push((plain(), Some(first_flies(&plain())), evals(4_000)));
     jobs

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use smalti::cpu::CpuPainter;
 use smalti::cpu::cells::CpuSearch;
-use smalti::evolve::style::Style;
 use smalti::model::cells::rules::BirthDepth;
-use smalti::model::cells::{Course, Search, SearchState};
+use smalti::model::cells::{Course, Rules, Search, SearchState};
+use smalti::model::tile::pack;
 use smalti::model::{Backdrop, Canvas, Fly, Painter, Population, Target};
 use smalti::photo::{ReadOptions, read};
+use smalti::studio::{Recipe, work};
 
 use crate::scenarios::{stream, translucent_masks};
 
@@ -34,14 +35,13 @@ fn uneven(width_px: u32, height_px: u32) -> Target {
 
 /// Tiles of the style `spray` in random masks, which have shades and holes, too.
 fn course(target: Target, fly_count: usize) -> Course {
-    let side = smalti::model::operators::tile_side(target.width_px(), target.height_px(), fly_count);
+    let recipe = Recipe::spray().tiles(fly_count as u64).seed(7);
+    let course = work(&Arc::new(target), &recipe).expect("the recipe is right").course;
     let masks = translucent_masks(&mut stream(5));
-    let mut rules = Style::spray().rules(7, side, fly_count, BACKGROUND, BACKGROUND);
-    rules.mask_first = 0;
-    rules.mask_count = masks.layers().len() as u32;
-    rules.steps_per_fly = 3;
-    let guide = Arc::new(smalti::guide::sharp(&target));
-    Course { rules, target: Arc::new(target), guide, masks: Arc::new(masks), fly_count }
+    let mask_count = masks.layers().len() as u32;
+    let background = pack(BACKGROUND);
+    let rules = Rules { background, mask_first: 0, mask_count, steps_per_fly: 3, ..course.rules };
+    Course { rules, masks: Arc::new(masks), ..course }
 }
 
 /// The objective of a picture drawn from some flies.

@@ -20,15 +20,27 @@ use crate::studio::{self, Device, Drawn, Job, Provenance, Provenances, finish};
 /// A picture that is ready to be evolved.
 #[derive(Debug)]
 pub(crate) struct Prepared {
+    /// What the picture is called in traces and reports.
+    pub id: String,
     pub job: Job,
     pub provenances: Provenances,
     /// How long it took to read.
     pub load_time: Duration,
 }
 
-/// What an evolution led to.
+/// An evolution that is over, whether it worked or failed.
+pub(crate) struct Evolution {
+    pub took: Duration,
+    /// Whether the CPU searched in the place of the device.
+    pub is_stand_in: bool,
+    pub outcome: Result<Evolved>,
+}
+
+/// The result of an evolution, drawn.
 pub(crate) struct Evolved {
     pub ending: Ending,
+    /// Signal-to-noise ratio against the target; none for a perfect likeness.
+    pub psnr_db: Option<f64>,
     /// The best population.
     pub drawn: Drawn,
     /// The curve of the evolution, if it was asked for.
@@ -57,7 +69,7 @@ impl Prepared {
         let load_time = began.elapsed();
         let resized_px = options.resized_px(job.target.width_px(), job.target.height_px());
         let provenances = Provenances::new(&options.settings, &job, resized_px);
-        Ok(Self { job, provenances, load_time })
+        Ok(Self { id: id.to_owned(), job, provenances, load_time })
     }
 
     /// The provenance of an output.
@@ -86,19 +98,15 @@ impl Prepared {
         Ok(self.job.memory_bytes(written_pixel_count * destination::memory_weight(&options.outputs)))
     }
 
-    /// Evolves the picture and draws its best population; notes the result in `row`.
-    ///
-    /// # Errors
-    /// If the device fails.
+    /// Evolves the picture and draws its best population.
     pub fn evolve(
         &self,
         options: &PictureOptions,
         device: &Device,
         watchers: &mut Watchers<'_>,
         keep: Keep,
-        row: &mut Row,
-    ) -> Result<Evolved> {
-        let _span = options.tracer.span("evolve").tell("picture", row.id.as_str());
+    ) -> Evolution {
+        let _span = options.tracer.span("evolve").tell("picture", self.id.as_str());
         let progress = Progress::new(options.progress);
         let mut watch = Watch::begin(watchers, &options.settings, progress, self.job.evals_planned());
         let mut curve = (keep == Keep::Curve).then(|| Curve::new(self.job.evals_planned()));
@@ -107,37 +115,28 @@ impl Prepared {
         let observers = &mut (&mut (&mut watch, &mut curve), &mut course);
         let evolved = studio::evolve(&self.job, device, observers, &mut instruments);
         let took = watch.finish();
-        if let Some(reason) = instruments.stand_in() {
-            row.device = Some("CPU".to_owned());
-            if options.verbosity > Verbosity::Quiet {
-                terminal::say(&format!("smalti: searching on the CPU, since {reason}"));
-            }
+        let stand_in = instruments.stand_in();
+        if let Some(reason) = stand_in.filter(|_| options.verbosity > Verbosity::Quiet) {
+            terminal::say(&format!("smalti: searching on the CPU, since {reason}"));
         }
-        row.evolve_ms = milliseconds(took);
-        let ended = evolved?;
-        let mut painter = options.tracer.painter(device.open_painter()?);
-        let (ending, drawn) = self.draw(options, ended, &mut *painter, row)?;
-        drop(painter);
-        device.check_validation()?;
-        Ok(Evolved { ending, drawn, curve })
+        let draw = |ended| {
+            let mut painter = options.tracer.painter(device.open_painter()?);
+            let evolved = self.draw(options, ended, &mut *painter)?;
+            drop(painter);
+            device.check_validation()?;
+            Ok(Evolved { curve, ..evolved })
+        };
+        Evolution { took, is_stand_in: stand_in.is_some(), outcome: evolved.and_then(draw) }
     }
 
-    /// Draws the result of an evolution, and notes it in `row`.
+    /// Draws the result of an evolution.
     ///
     /// # Errors
     /// If the device fails, or if the mosaic is not what was scored.
-    pub fn draw(
-        &self,
-        options: &PictureOptions,
-        ended: Ended,
-        painter: &mut dyn Painter,
-        row: &mut Row,
-    ) -> Result<(Ending, Drawn)> {
-        row.note_ended(&ended, &self.job);
+    pub fn draw(&self, options: &PictureOptions, ended: Ended, painter: &mut dyn Painter) -> Result<Evolved> {
         let mut finished = finish(&self.job, ended, painter, options.output_long_side_px)?;
         outputs::draw(&mut finished.drawn, painter, destination::pieces(&options.outputs), options.verbosity)?;
-        row.psnr = finished.psnr_db;
-        Ok((finished.ending, finished.drawn))
+        Ok(Evolved { ending: finished.ending, psnr_db: finished.psnr_db, drawn: finished.drawn, curve: None })
     }
 }
 
@@ -147,5 +146,24 @@ impl Row {
         self.load_ms = milliseconds(prepared.load_time);
         self.tiles = Some(prepared.job.fly_count);
         self.key = Some(prepared.of_row(options).key().to_owned());
+    }
+
+    /// Notes what an evolution took and what it led to, which is returned.
+    ///
+    /// # Errors
+    /// If it failed.
+    pub fn note_evolution(&mut self, Evolution { took, is_stand_in, outcome }: Evolution) -> Result<Evolved> {
+        self.evolve_ms = milliseconds(took);
+        if is_stand_in {
+            self.device = Some("CPU".to_owned());
+        }
+        outcome.inspect(|evolved| self.note_evolved(evolved))
+    }
+
+    /// Notes the result of an evolution.
+    pub fn note_evolved(&mut self, evolved: &Evolved) {
+        self.note_population(&evolved.drawn.population);
+        self.note_ending(&evolved.ending);
+        self.psnr = evolved.psnr_db;
     }
 }

@@ -8,8 +8,9 @@ use serde_json::{Map, Value};
 use crate::cli::terminal::interrupt::EXIT_INTERRUPTED;
 use crate::cli::terminal::{advice, host_name, print_json};
 use crate::error::{Error, Result};
-use crate::evolve::{Ended, Ending, Spread, Tally};
-use crate::studio::{Job, Scheme};
+use crate::evolve::{Ending, Spread, Tally};
+use crate::model::Population;
+use crate::studio::Scheme;
 
 /// The outcome of the work on a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -114,11 +115,11 @@ impl Row {
         }
     }
 
-    /// Notes the result of an evolution.
-    pub fn note_ended(&mut self, ended: &Ended, job: &Job) {
-        self.spread = Spread::of(&ended.flies, job.target.width_px(), job.target.height_px()).clark_evans;
-        self.living = Some(ended.flies.iter().filter(|fly| fly.alive).count());
-        self.note_ending(&ended.ending);
+    /// Notes how tiles are spread, and how many live.
+    pub fn note_population(&mut self, population: &Population) {
+        let Population { width_px, height_px, flies, .. } = population;
+        self.spread = Spread::of(flies, *width_px, *height_px).clark_evans;
+        self.living = Some(flies.iter().filter(|fly| fly.alive).count());
     }
 
     /// Notes how the evolution ended, and its counts.

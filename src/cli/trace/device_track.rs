@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use serde_json::{Map, Value, json};
 
-use super::tracer::{Tracer, Track, Weight};
+use super::tracer::{Times, Tracer, Track, Weight};
 use crate::vk::{ClockMethod, Device, PassTime, Submission, SubmissionObserver, Timing};
 
 /// How many readings are made. The closest one counts.
@@ -86,7 +86,7 @@ impl DeviceTrack {
     fn note_passes(&self, device: &Device, clock: Clock, passes: &[PassTime], told: &Map<String, Value>) {
         for PassTime { name, ms, start_ticks } in passes {
             let since = device.info().limits.ns_between(clock.ticks, *start_ticks).round() as i64;
-            let times = (clock.at.as_nanos() as i64 + since, (ms * 1e6).round() as u64);
+            let times = Times { start_ns: clock.at.as_nanos() as i64 + since, ns: (ms * 1e6).round() as u64 };
             self.tracer.note_pass(self.track, name, times, told.clone());
         }
     }
@@ -114,6 +114,6 @@ impl SubmissionObserver for DeviceTrack {
             self.note_passes(device, clock, passes, &Map::from_iter([number.clone()]));
         }
         let told = Map::from_iter([number, ("recorder".to_owned(), submission.recorder.into())]);
-        self.tracer.note("submit and wait", Weight::Frequent, (began.unwrap_or(ended), ended), told);
+        self.tracer.note("submit and wait", Weight::Frequent, began.unwrap_or(ended)..ended, told);
     }
 }

@@ -172,7 +172,7 @@ impl CourseTrace {
         let made = count.saturating_sub(self.count_told);
         let mut told = told;
         told.insert(unit.to_owned(), made.into());
-        self.tracer.note(name, Weight::Frequent, (self.began, self.last), told);
+        self.tracer.note(name, Weight::Frequent, self.began..self.last, told);
         (self.began, self.steps, self.count_told) = (self.last, 0, count);
     }
 

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use std::fmt::Debug;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
+use std::ops::Range;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::ThreadId;
@@ -115,23 +116,17 @@ impl Tracer {
         Span { tracer: self, name, weight, began: self.now(), told: Map::new() }
     }
 
-    /// Something that this thread did from `began` to `ended`. It must not overlap other spans of the thread, except by
-    /// enclosing them.
-    pub(crate) fn note(
-        &self,
-        name: &str,
-        weight: Weight,
-        (began, ended): (Duration, Duration),
-        told: Map<String, Value>,
-    ) {
+    /// Something that this thread did between these times since the trace began. It must not overlap other spans of the
+    /// thread, except by enclosing them.
+    pub(crate) fn note(&self, name: &str, weight: Weight, times: Range<Duration>, told: Map<String, Value>) {
         let Some(mut log) = self.log() else { return };
         let track = log.track();
-        let times = (began.as_nanos() as i64, ended.saturating_sub(began).as_nanos() as u64);
-        log.span(track, name, weight, times, told);
+        let ns = times.end.saturating_sub(times.start).as_nanos() as u64;
+        log.span(track, name, weight, Times { start_ns: times.start.as_nanos() as i64, ns }, told);
     }
 
-    /// As [`Tracer::note`], for a pass of a device, with times in nanoseconds since the trace began.
-    pub(crate) fn note_pass(&self, track: Track, name: &str, times: (i64, u64), told: Map<String, Value>) {
+    /// As [`Tracer::note`], for a pass of a device.
+    pub(crate) fn note_pass(&self, track: Track, name: &str, times: Times, told: Map<String, Value>) {
         if let Some(mut log) = self.log() {
             log.span(track, name, Weight::Frequent, times, told);
         }
@@ -183,6 +178,14 @@ impl Tracer {
     }
 }
 
+/// When something happened, and how long it took.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Times {
+    /// Nanoseconds since the trace began; negative before.
+    pub start_ns: i64,
+    pub ns: u64,
+}
+
 /// An event in the words of the format.
 struct Event<'a> {
     name: &'a str,
@@ -214,9 +217,9 @@ impl Log {
         self.event(Weight::Stage, &Event { name: what, phase: "M", track, ts: 0, rest: String::new(), told });
     }
 
-    fn span(&mut self, track: Track, name: &str, weight: Weight, (ts, ns): (i64, u64), told: Map<String, Value>) {
-        let rest = format!(",\"dur\":{}", microseconds(ns as i64));
-        self.event(weight, &Event { name, phase: "X", track, ts, rest, told });
+    fn span(&mut self, track: Track, name: &str, weight: Weight, times: Times, told: Map<String, Value>) {
+        let rest = format!(",\"dur\":{}", microseconds(times.ns as i64));
+        self.event(weight, &Event { name, phase: "X", track, ts: times.start_ns, rest, told });
     }
 
     /// Writes an event unless there are too many.
@@ -284,7 +287,7 @@ impl Drop for Span<'_> {
     fn drop(&mut self) {
         if self.tracer.is_on() {
             let told = std::mem::take(&mut self.told);
-            self.tracer.note(self.name, self.weight, (self.began, self.tracer.now()), told);
+            self.tracer.note(self.name, self.weight, self.began..self.tracer.now(), told);
         }
     }
 }

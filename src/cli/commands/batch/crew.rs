@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::queue::Queue;
 use super::stages::{Done, Outlets, Pipeline, Ready, Report, unless_it_panics};
+use crate::cli::jobs::prepared::Evolved;
 use crate::cli::terminal::advice::why_no_vulkan;
 use crate::cli::terminal::milliseconds;
 use crate::engine::{self, Finished};
@@ -22,14 +23,20 @@ pub(super) struct Crew<'a, 'p> {
     pub outlets: Outlets<'a>,
     lanes: engine::Crew,
     painter: Box<dyn Painter>,
-    /// The pictures on board by their tickets, each with the time when it began.
-    aboard: HashMap<u64, (Ready<'a>, Instant)>,
+    /// The pictures on board by their tickets.
+    aboard: HashMap<u64, Aboard<'a>>,
     /// The next picture, if there was no room for it yet.
     held: Option<Ready<'a>>,
     /// Whether there is no room until a picture is done.
     is_full: bool,
     tickets: u64,
     counted: Counted,
+}
+
+/// A picture on board.
+struct Aboard<'a> {
+    picture: Ready<'a>,
+    began: Instant,
 }
 
 /// When the counters of the trace were last written, and the evals of all pictures on board at that time.
@@ -119,7 +126,7 @@ impl<'a, 'p> Crew<'a, 'p> {
         match self.begin(ticket, &picture) {
             Ok(true) => {
                 self.tickets += 1;
-                self.aboard.insert(ticket, (picture, Instant::now()));
+                self.aboard.insert(ticket, Aboard { picture, began: Instant::now() });
                 Ok(Admitted::Aboard)
             }
             Ok(false) => {
@@ -177,14 +184,17 @@ impl<'a, 'p> Crew<'a, 'p> {
     }
 
     /// Draws a picture that is done, and hands it to the threads that save.
-    fn send_on(&mut self, (mut picture, began): (Ready<'a>, Instant), finished: Finished) -> Result<()> {
+    fn send_on(&mut self, Aboard { mut picture, began }: Aboard<'a>, finished: Finished) -> Result<()> {
         self.is_full = false;
         picture.row.evolve_ms = milliseconds(began.elapsed());
         let _span = self.pipeline.tracer.span("finish").tell("picture", picture.row.id.as_str());
         let Ready { work, row, .. } = &mut picture;
-        let drawn = unless_it_panics(|| work.prepared.draw(&work.options, finished.outcome?, &mut *self.painter, row));
-        match drawn.and_then(|drawn| self.device.check_validation().map(|()| drawn)) {
-            Ok((ending, drawn)) => drop(self.outlets.done.send(Done { ready: picture, ending, drawn })),
+        let drawn = unless_it_panics(|| work.prepared.draw(&work.options, finished.outcome?, &mut *self.painter));
+        let evolved = drawn.inspect(|evolved| row.note_evolved(evolved));
+        match evolved.and_then(|evolved| self.device.check_validation().map(|()| evolved)) {
+            Ok(Evolved { ending, drawn, .. }) => {
+                drop(self.outlets.done.send(Done { ready: picture, ending, drawn }));
+            }
             Err(error @ Error::DeviceLost { .. }) => {
                 self.pipeline.fail(
                     picture.row,

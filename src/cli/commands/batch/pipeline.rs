@@ -64,9 +64,9 @@ impl<'a> Pipeline<'a> {
         let in_flight = self.workers.iter().map(Worker::in_flight).sum::<usize>().clamp(1, READ_AHEAD_MAX);
         let (reports, received) = channel();
         let (ready_in, ready_out) = sync_channel(in_flight);
-        let (done_in, done_out) = sync_channel(self.io_threads.1);
+        let (done_in, done_out) = sync_channel(self.io_threads.save);
         let (ready_out, done_out) = (Arc::new(Queue::new(ready_out)), Arc::new(Queue::new(done_out)));
-        for _ in 0..self.io_threads.0 {
+        for _ in 0..self.io_threads.load {
             let (ready, reports) = (ready_in.clone(), reports.clone());
             scope.spawn(move || self.read_all(&ready, &reports));
         }
@@ -77,7 +77,7 @@ impl<'a> Pipeline<'a> {
                 scope.spawn(move || self.evolve_all(&worker.device, crew, &ready, &outlets));
             }
         }
-        for _ in 0..self.io_threads.1 {
+        for _ in 0..self.io_threads.save {
             let (done, reports) = (Arc::clone(&done_out), reports.clone());
             scope.spawn(move || self.save_all(&done, &reports));
         }
@@ -166,8 +166,10 @@ impl<'a> Pipeline<'a> {
     fn save_all(&self, done: &Queue<Done<'a>>, reports: &Sender<Report>) {
         while let Some(Done { ready, ending, drawn }) = done.take() {
             let Ready { item, work, mut row } = ready;
-            match unless_it_panics(|| self.save(&work, &ending, &drawn, &mut row)) {
+            let began = Instant::now();
+            match unless_it_panics(|| self.save(&work, &ending, &drawn)) {
                 Ok(()) => {
+                    row.save_ms = terminal::milliseconds(began.elapsed());
                     row.output = item.outputs.iter().map(|output| output.path.display().to_string()).collect();
                     row.status = Status::Complete;
                     tell(reports, row);
@@ -178,9 +180,8 @@ impl<'a> Pipeline<'a> {
         }
     }
 
-    fn save(&self, work: &Work<'_>, ending: &Ending, drawn: &Drawn, row: &mut Row) -> Result<()> {
-        let began = Instant::now();
-        let _span = self.tracer.span("save").tell("picture", row.id.as_str());
+    fn save(&self, work: &Work<'_>, ending: &Ending, drawn: &Drawn) -> Result<()> {
+        let _span = self.tracer.span("save").tell("picture", work.prepared.id.as_str());
         let outputs: Vec<&Destination> = work.to_write.iter().collect();
         let files = outputs::encode(&outputs, drawn, &work.prepared.provenances.told(ending))?;
         for file in &files {
@@ -195,7 +196,6 @@ impl<'a> Pipeline<'a> {
             // No sync to disk: if a crash of the system cuts a file short, the next run finds it and makes it anew.
             self.interrupt.while_writing(|| output::write_atomically_soon(path, &file.bytes))?;
         }
-        row.save_ms = terminal::milliseconds(began.elapsed());
         Ok(())
     }
 }

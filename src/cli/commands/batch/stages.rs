@@ -13,7 +13,7 @@ use crate::cli::jobs::prepared::{Evolved, Keep, Prepared};
 use crate::cli::jobs::row::Row;
 use crate::cli::jobs::watch::Watchers;
 use crate::cli::list::shard::Shard;
-use crate::cli::list::{Item, OnExists};
+use crate::cli::list::{IoThreads, Item, OnExists};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::trace::Tracer;
 use crate::error::{Error, Result};
@@ -41,7 +41,7 @@ pub(super) struct Pipeline<'a> {
     pub items: &'a [Item],
     pub workers: &'a [Worker],
     /// How many threads read, and how many save.
-    pub io_threads: (usize, usize),
+    pub io_threads: IoThreads,
     pub on_exists: OnExists,
     pub shard: Option<Shard>,
     pub schedule: &'a Schedule,
@@ -106,17 +106,19 @@ impl<'a> Pipeline<'a> {
         mut picture: Ready<'a>,
         outlets: &Outlets<'a>,
     ) {
-        let mut evolve = || {
+        let Ready { work: Work { options, prepared, .. }, row, .. } = &mut picture;
+        row.device = Some(device.label().to_owned());
+        let evolve = || {
             let mut watchers = Watchers { interrupt: self.interrupt, recorder: None };
-            let Ready { work: Work { options, prepared, .. }, row, .. } = &mut picture;
-            row.device = Some(device.label().to_owned());
-            prepared.evolve(options, device, &mut watchers, Keep::Nothing, row)
+            prepared.evolve(options, device, &mut watchers, Keep::Nothing)
         };
-        let evolved = unless_it_panics(|| match pool {
-            Some(pool) => pool.install(evolve),
-            None => evolve(),
+        let evolution = unless_it_panics(|| {
+            Ok(match pool {
+                Some(pool) => pool.install(evolve),
+                None => evolve(),
+            })
         });
-        match evolved {
+        match evolution.and_then(|evolution| row.note_evolution(evolution)) {
             // An interrupted picture leaves no files.
             Ok(Evolved { ending, .. }) if !ending.is_complete() => self.schedule.end(),
             Ok(Evolved { ending, drawn, .. }) => drop(outlets.done.send(Done { ready: picture, ending, drawn })),

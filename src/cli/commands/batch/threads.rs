@@ -20,10 +20,10 @@ const LANES_USUAL: usize = 256;
 const LANES_USUAL_IN_SOFTWARE: usize = 16;
 
 /// How many threads read, and how many save; no more than there are pictures.
-pub(super) fn io_threads(asked_for: Option<IoThreads>, threads: usize, item_count: usize) -> (usize, usize) {
+pub(super) fn io_threads(asked_for: Option<IoThreads>, threads: usize, item_count: usize) -> IoThreads {
     let usual = threads.div_ceil(2).min(IO_THREADS_USUAL);
     let IoThreads { load, save } = asked_for.unwrap_or(IoThreads { load: usual, save: usual });
-    (load.min(item_count).max(1), save.min(item_count).max(1))
+    IoThreads { load: load.min(item_count).max(1), save: save.min(item_count).max(1) }
 }
 
 /// The devices, each with the number of pictures that it evolves at the same time.
@@ -63,8 +63,8 @@ mod tests {
 
     #[test]
     fn unless_said_half_of_the_threads_read_and_half_save_and_no_more_than_there_are_pictures() {
-        assert_eq!(io_threads(None, 2, 1_000), (1, 1));
-        assert_eq!(io_threads(None, 64, 3), (3, 3));
-        assert_eq!(io_threads(Some(IoThreads { load: 9, save: 4 }), 2, 1_000), (9, 4));
+        assert_eq!(io_threads(None, 2, 1_000), IoThreads { load: 1, save: 1 });
+        assert_eq!(io_threads(None, 64, 3), IoThreads { load: 3, save: 3 });
+        assert_eq!(io_threads(Some(IoThreads { load: 9, save: 4 }), 2, 1_000), IoThreads { load: 9, save: 4 });
     }
 }

@@ -32,8 +32,8 @@ impl Unit {
         }
     }
 
-    /// The value of work that took `seconds` for an amount of `amount`.
-    fn value(self, (seconds, amount): (f64, u64)) -> f64 {
+    /// The value of a repeat.
+    fn value(self, Lap { seconds, amount }: Lap) -> f64 {
         let (seconds, amount) = (seconds.max(1e-9), amount as f64);
         match self {
             Self::EvalsPerS | Self::BirthsPerS => amount / seconds,
@@ -61,8 +61,20 @@ pub(super) struct Measurement {
     pub repeats: usize,
 }
 
-/// One repeat: how many seconds it took, and how much work it did.
-pub(super) type Lap = (f64, u64);
+/// One repeat.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Lap {
+    pub seconds: f64,
+    /// How much work was done.
+    pub amount: u64,
+}
+
+impl Lap {
+    /// The repeat that began then and ends now.
+    pub(super) fn since(began: Instant, amount: u64) -> Self {
+        Self { seconds: began.elapsed().as_secs_f64(), amount }
+    }
+}
 
 impl Measurement {
     /// The median of `laps`.
@@ -103,15 +115,16 @@ mod tests {
     #[test]
     fn the_value_is_the_median_of_all_laps_but_the_first() {
         let mut seconds = [900.0, 4.0, 1.0, 2.0, 8.0].into_iter().cycle();
-        let laps = repeat(Duration::ZERO, || Ok((seconds.next().unwrap_or_default(), 1))).expect("nothing fails");
-        assert_eq!(laps, [(4.0, 1)], "with no time at all there is still one repeat");
+        let laps = repeat(Duration::ZERO, || Ok(seconds.next().unwrap_or_default())).expect("nothing fails");
+        assert_eq!(laps, [4.0], "with no time at all there is still one repeat");
+        let lap = |seconds, amount| Lap { seconds, amount };
         let of = |unit, laps: &[Lap]| {
             let Measurement { value, low, high, repeats, .. } = Measurement::of("some", unit, laps);
             (value, low, high, repeats)
         };
-        assert_eq!(of(Unit::Ms, &[(4.0, 1), (1.0, 1), (2.0, 1)]), (2_000.0, 1_000.0, 4_000.0, 3));
-        assert_eq!(of(Unit::EvalsPerS, &[(4.0, 8), (1.0, 8), (2.0, 8), (8.0, 8)]), (3.0, 1.0, 8.0, 4));
-        assert_eq!(of(Unit::PicturesPerHour, &[(1.5, 1)]), (2_400.0, 2_400.0, 2_400.0, 1));
+        assert_eq!(of(Unit::Ms, &[lap(4.0, 1), lap(1.0, 1), lap(2.0, 1)]), (2_000.0, 1_000.0, 4_000.0, 3));
+        assert_eq!(of(Unit::EvalsPerS, &[lap(4.0, 8), lap(1.0, 8), lap(2.0, 8), lap(8.0, 8)]), (3.0, 1.0, 8.0, 4));
+        assert_eq!(of(Unit::PicturesPerHour, &[lap(1.5, 1)]), (2_400.0, 2_400.0, 2_400.0, 1));
     }
 
     #[test]

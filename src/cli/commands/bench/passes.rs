@@ -62,7 +62,7 @@ pub(super) fn of_rounds(
     })?;
     let mut passes: Vec<(&'static str, Vec<Lap>)> = Vec::new();
     for (name, seconds) in laps.into_iter().flatten() {
-        let lap = (seconds, u64::from(rounds));
+        let lap = Lap { seconds, amount: u64::from(rounds) };
         match passes.iter_mut().find(|(known, _)| *known == name) {
             Some((_, laps)) => laps.push(lap),
             None => passes.push((name, vec![lap])),

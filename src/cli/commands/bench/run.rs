@@ -128,11 +128,12 @@ impl<'a> Bench<'a> {
         let laps = repeat(self.budget, || {
             let began = Instant::now();
             evaluator.load(&[(0, &flies)])?;
-            let lap = (began.elapsed().as_secs_f64(), 1);
+            let lap = Lap::since(began, 1);
             for (name, ms) in evaluator.pass_times() {
+                let lap = Lap { seconds: ms / 1e3, amount: 1 };
                 match passes.iter_mut().find(|(known, _)| *known == name) {
-                    Some((_, laps)) => laps.push((ms / 1e3, 1)),
-                    None => passes.push((name, vec![(ms / 1e3, 1)])),
+                    Some((_, laps)) => laps.push(lap),
+                    None => passes.push((name, vec![lap])),
                 }
             }
             Ok(lap)
@@ -157,7 +158,7 @@ impl<'a> Bench<'a> {
             let mut engine = Engine::new(evaluator, vec![evolution]);
             let began = Instant::now();
             engine.run(&mut Undisturbed)?;
-            Ok((began.elapsed().as_secs_f64(), BIRTHS))
+            Ok(Lap::since(began, BIRTHS))
         })?;
         self.note([Measurement::of(name, Unit::BirthsPerS, &laps)]);
         Ok(())
@@ -171,8 +172,9 @@ impl<'a> Bench<'a> {
             search.load(flies)?;
             let began = Instant::now();
             search.advance(rounds)?;
-            let (seconds, standing) = (began.elapsed().as_secs_f64(), search.standing());
-            Ok([(seconds, standing.evals), (seconds, standing.births)])
+            let standing = search.standing();
+            let lap = Lap::since(began, standing.evals);
+            Ok([lap, Lap { amount: standing.births, ..lap }])
         })?;
         let of = |which: usize| laps.iter().map(|lap| lap[which]).collect::<Vec<Lap>>();
         let evals = Measurement::of(name.clone(), Unit::EvalsPerS, &of(0));
@@ -194,7 +196,7 @@ impl<'a> Bench<'a> {
         let began = Instant::now();
         let mut laps = Vec::new();
         while laps.is_empty() || began.elapsed() < self.budget {
-            laps.push((self.make_picture()?, 1));
+            laps.push(Lap { seconds: self.make_picture()?, amount: 1 });
         }
         self.note([Measurement::of(row, Unit::PicturesPerHour, &laps)]);
         Ok(())

@@ -31,7 +31,10 @@ use crate::studio::{Device, Job, Provenance, picture_metadata, without_header};
 /// Evolves one picture and reports on it; returns the exit code of the process.
 pub(crate) fn evolve(args: &EvolveArgs) -> ExitCode {
     let mut row = Row::new(&args.input, args.picture.seed, args.picture.scheme());
-    let done = EvolveOptions::new(args).and_then(|options| evolve_watched(options, &args.trace, &mut row));
+    let done = EvolveOptions::new(args).and_then(|options| {
+        let run = Run { options, interrupt: Interrupt::listen()?, row: &mut row };
+        run.evolve_traced(&args.trace)
+    });
     if let Err(error) = &done {
         row.note_failure(error);
         terminal::error(&advice::sentence(error));
@@ -46,74 +49,80 @@ pub(crate) fn evolve(args: &EvolveArgs) -> ExitCode {
     }
 }
 
-/// As [`evolve_picture`], and writes the trace if one was asked for.
-fn evolve_watched(mut options: EvolveOptions, trace_args: &TraceArgs, row: &mut Row) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
-    if let (Some(path), Mode::Work) = (&trace_args.trace, options.mode) {
-        let taken = options.files_written().chain(options.picture.settings.init_file());
-        let taken: Vec<&Path> = taken.chain(options.picture.picture_inputs()).collect();
-        options.picture.tracer = trace::begin_trace(path, &taken, options.files.overwrite)?;
-    }
-    evolve_picture(&options, trace_args.capture, &interrupt, row)?;
-    let tracer = &options.picture.tracer;
-    let Some(path) = trace_args.trace.as_ref().filter(|_| tracer.is_on()) else { return Ok(()) };
-    let events = interrupt.while_writing(|| tracer.finish())?;
-    row.output.push(path.display().to_string());
-    if options.picture.verbosity > Verbosity::Quiet {
-        terminal::say(&format!("smalti: {} has {events} events; ui.perfetto.dev shows them", path.display()));
-    }
-    Ok(())
+/// The work that the command was asked for.
+struct Run<'r> {
+    options: EvolveOptions,
+    interrupt: Interrupt,
+    /// What is known of the result so far, which a failure leaves as it is.
+    row: &'r mut Row,
 }
 
-/// The work, in order: check, read, evolve and draw, encode and write.
-fn evolve_picture(
-    options: &EvolveOptions,
-    capture: Option<CaptureRange>,
-    interrupt: &Interrupt,
-    row: &mut Row,
-) -> Result<()> {
-    let EvolveOptions { picture, files, mode, computing } = options;
-    computing.start_threads()?;
-    check_places(options)?;
-    let device = {
-        let _span = picture.tracer.span("open device");
-        computing.select()?
-    };
-    trace::trace_device(&picture.tracer, &device);
-    let capture = capture.map(|range| trace::begin_capture(range, &device)).transpose()?;
-    row.device = Some(device.label().to_owned());
-
-    let prepared = Prepared::load(picture, &row.id)?;
-    row.note_prepared(&prepared, picture);
-    let memory_bytes = prepared.check(picture)?;
-    memory::check(memory_bytes)?;
-    if picture.verbosity > Verbosity::Quiet {
-        say_notes(&prepared.job, picture, &device);
-    }
-    check_replaceable(options, &prepared)?;
-    if *mode == Mode::DryRun {
-        row.status = Status::Planned;
-        let folders = files.save_run.iter().map(|save_run| save_run.folder.as_path());
-        row.output = options.files_written().chain(folders).map(|path| path.display().to_string()).collect();
-        summary::print_plan(row, picture, &prepared.job, memory_bytes);
-        return Ok(());
+impl Run<'_> {
+    /// As [`Run::evolve`], and writes the trace if one was asked for.
+    fn evolve_traced(mut self, trace_args: &TraceArgs) -> Result<()> {
+        let options = &mut self.options;
+        if let (Some(path), Mode::Work) = (&trace_args.trace, options.mode) {
+            let taken = options.files_written().chain(options.picture.settings.init_file());
+            let taken: Vec<&Path> = taken.chain(options.picture.picture_inputs()).collect();
+            options.picture.tracer = trace::begin_trace(path, &taken, options.files.overwrite)?;
+        }
+        self.evolve(trace_args.capture)?;
+        let Self { options: EvolveOptions { picture, .. }, interrupt, row } = self;
+        let Some(path) = trace_args.trace.as_ref().filter(|_| picture.tracer.is_on()) else { return Ok(()) };
+        let events = interrupt.while_writing(|| picture.tracer.finish())?;
+        row.output.push(path.display().to_string());
+        if picture.verbosity > Verbosity::Quiet {
+            terminal::say(&format!("smalti: {} has {events} events; ui.perfetto.dev shows them", path.display()));
+        }
+        Ok(())
     }
 
-    let mut watchers = Watchers { interrupt, recorder: begin_record(files, &prepared)? };
-    let keep = if files.curves.is_empty() { Keep::Nothing } else { Keep::Curve };
-    let evolved = prepared.evolve(picture, &device, &mut watchers, keep, row)?;
-    let began = Instant::now();
-    let status = if evolved.ending.is_complete() { Status::Complete } else { Status::Partial };
-    write(options, &prepared, evolved, interrupt, row)?;
-    // If snapshots could not be written, that is reported after the result has been saved.
-    row.output.extend(watchers.recorder.map(Recorder::outcome).transpose()?);
-    capture.map_or(Ok(()), |capture| note_capture(&capture, picture, row))?;
-    row.save_ms = terminal::milliseconds(began.elapsed());
-    row.status = status;
-    if picture.verbosity > Verbosity::Quiet {
-        summary::print_summary(row, picture, &prepared.job);
+    /// The work, in order: check, read, evolve and draw, encode and write.
+    fn evolve(&mut self, capture: Option<CaptureRange>) -> Result<()> {
+        let Self { options, interrupt, row } = self;
+        let EvolveOptions { picture, files, mode, computing } = &*options;
+        computing.start_threads()?;
+        check_places(options)?;
+        let device = {
+            let _span = picture.tracer.span("open device");
+            computing.select()?
+        };
+        trace::trace_device(&picture.tracer, &device);
+        let capture = capture.map(|range| trace::begin_capture(range, &device)).transpose()?;
+        row.device = Some(device.label().to_owned());
+
+        let prepared = Prepared::load(picture, &row.id)?;
+        row.note_prepared(&prepared, picture);
+        let memory_bytes = prepared.check(picture)?;
+        memory::check(memory_bytes)?;
+        if picture.verbosity > Verbosity::Quiet {
+            say_notes(&prepared.job, picture, &device);
+        }
+        check_replaceable(options, &prepared)?;
+        if *mode == Mode::DryRun {
+            row.status = Status::Planned;
+            let folders = files.save_run.iter().map(|save_run| save_run.folder.as_path());
+            row.output = options.files_written().chain(folders).map(|path| path.display().to_string()).collect();
+            summary::print_plan(row, picture, &prepared.job, memory_bytes);
+            return Ok(());
+        }
+
+        let mut watchers = Watchers { interrupt, recorder: begin_record(files, &prepared)? };
+        let keep = if files.curves.is_empty() { Keep::Nothing } else { Keep::Curve };
+        let evolved = row.note_evolution(prepared.evolve(picture, &device, &mut watchers, keep))?;
+        let began = Instant::now();
+        let status = if evolved.ending.is_complete() { Status::Complete } else { Status::Partial };
+        write(options, &prepared, evolved, interrupt, &mut row.output)?;
+        // If snapshots could not be written, that is reported after the result has been saved.
+        row.output.extend(watchers.recorder.map(Recorder::outcome).transpose()?);
+        row.output.extend(capture.map(|capture| end_capture(&capture, picture)).transpose()?);
+        row.save_ms = terminal::milliseconds(began.elapsed());
+        row.status = status;
+        if picture.verbosity > Verbosity::Quiet {
+            summary::print_summary(row, picture, &prepared.job);
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// Checks, before anything is read, that all files can be written, and that none is written twice or is an input.
@@ -125,16 +134,16 @@ fn check_places(options: &EvolveOptions) -> Result<()> {
     options.files.save_run.iter().try_for_each(|save_run| save_run.check_place(&mut written, &inputs))
 }
 
-/// Encodes everything, then writes it: pictures and populations first.
+/// Encodes everything, then writes it: pictures and populations first. `paths` gets theirs.
 fn write(
     options: &EvolveOptions,
     prepared: &Prepared,
     evolved: Evolved,
     interrupt: &Interrupt,
-    row: &mut Row,
+    paths: &mut Vec<String>,
 ) -> Result<()> {
     let EvolveOptions { picture, files, .. } = options;
-    let Evolved { ending, drawn, curve } = evolved;
+    let Evolved { ending, drawn, curve, .. } = evolved;
     let kept = outputs_to_write(options, prepared, &ending);
     let encoding = picture.tracer.span("encode");
     let mut encoded = outputs::encode(&kept, &drawn, &prepared.provenances.told(&ending))?;
@@ -142,12 +151,12 @@ fn write(
     encoded.extend(encode_target(files, &prepared.job, &prepared.provenances.target)?);
     drop(encoding);
     let writing = picture.tracer.span("write");
-    let written = outputs::write(&encoded, interrupt, &mut row.output);
+    let written = outputs::write(&encoded, interrupt, paths);
     let curve_written = curve.map_or(Ok(()), |curve| {
         let key = prepared.provenances.population.key();
         let curves = curves_to_write(options, key, &ending);
-        let ended = EndedCurve { curve: &curve, title: &row.id, key, ending: &ending };
-        curve_file::write(&curves, ended, interrupt, &mut row.output)
+        let ended = EndedCurve { curve: &curve, title: &prepared.id, key, ending: &ending };
+        curve_file::write(&curves, ended, interrupt, paths)
     });
     drop(writing);
     written.and(curve_written)
@@ -170,14 +179,13 @@ fn encode_target<'a>(files: &'a Files, job: &Job, provenance: &Provenance) -> Re
     Ok(Some(EncodedFile { destination, bytes }))
 }
 
-/// Says where the capture is.
-fn note_capture(capture: &Capture, options: &PictureOptions, row: &mut Row) -> Result<()> {
+/// Says where the capture is; returns its path.
+fn end_capture(capture: &Capture, options: &PictureOptions) -> Result<String> {
     let (path, what) = capture.outcome()?;
-    row.output.push(path.display().to_string());
     if options.verbosity > Verbosity::Quiet {
         terminal::say(&format!("smalti: {} holds {what}; qrenderdoc opens it", path.display()));
     }
-    Ok(())
+    Ok(path.display().to_string())
 }
 
 /// Begins to record snapshots, if they were asked for.

@@ -71,11 +71,12 @@ impl<'a> Shooter<'a> {
         Ok(Self { options, planned, store, device, painter, last: None, held: None })
     }
 
-    /// Evolves a frame and writes its files, or only those that are missing. Notes the result in `row`.
+    /// Evolves a frame and writes its files, or only those that are missing; returns its row.
     ///
     /// # Errors
     /// [`Error::Interrupted`] if the user interrupts. Then nothing of the frame is written.
-    pub(super) fn shoot(&mut self, frame: &Planned, watcher: &mut Watcher<'_>, row: &mut Row) -> Result<()> {
+    pub(super) fn shoot(&mut self, frame: &Planned, watcher: &mut Watcher<'_>) -> Result<Row> {
+        let mut row = self.row(frame);
         let began = Instant::now();
         let Task { job, picture, course, budget, flies } = self.task(frame)?;
         row.load_ms = milliseconds(began.elapsed());
@@ -105,23 +106,23 @@ impl<'a> Shooter<'a> {
         }
         let likeness = difference(&mosaic.pixels, &picture);
         // Measured against the unchanged picture, not against the held values of its still pixels.
-        let ended =
-            Ended { ending: Ending { sae: likeness.sae(), ..ending }, flies: population.flies.clone(), fitness };
-        row.note_ended(&ended, &job);
+        let ending = Ending { sae: likeness.sae(), ..ending };
+        row.note_population(&population);
+        row.note_ending(&ending);
         row.psnr = likeness.psnr_db();
-        let Ended { ending, fitness, .. } = ended;
         let last = Last { number: frame.number, population, fitness, mosaic };
-        self.write(frame, &last, &ending, watcher, row)?;
+        row.output = self.write(frame, &last, &ending, watcher)?;
         self.last = Some(last);
         row.save_ms = milliseconds(began.elapsed());
-        Ok(())
+        Ok(row)
     }
 
-    /// Draws the picture of a frame again from its complete population.
+    /// Draws the picture of a frame again from its complete population; returns its row.
     ///
     /// # Errors
     /// If it cannot be drawn or written.
-    pub(super) fn redraw(&mut self, frame: &Planned, watcher: &Watcher<'_>, row: &mut Row) -> Result<()> {
+    pub(super) fn redraw(&mut self, frame: &Planned, watcher: &Watcher<'_>) -> Result<Row> {
+        let mut row = self.row(frame);
         let path = self.store.population(frame.number);
         let gone = || Error::input(&path, "disappeared while frames were made; run the same command again");
         let archive = self.store.whole_population(frame).ok_or_else(gone)?;
@@ -143,10 +144,21 @@ impl<'a> Shooter<'a> {
             let mosaic = self.draw(&archive.population)?;
             let Archive { population, fitness, .. } = archive;
             let last = Last { number: frame.number, population, fitness, mosaic };
-            self.write(frame, &last, &ending, watcher, row)?;
+            row.output = self.write(frame, &last, &ending, watcher)?;
             self.last = Some(last);
         }
-        Ok(())
+        Ok(row)
+    }
+
+    /// The row of a frame before its result is known.
+    fn row(&self, frame: &Planned) -> Row {
+        let pictures = &self.options.pictures;
+        let mut row = Row::new(&frame.input, pictures.seed(), pictures.scheme());
+        row.device = Some(self.device.label().to_owned());
+        row.tiles = Some(frame.tiles);
+        let told = if self.options.folder.is_some() { &frame.picture } else { &frame.population };
+        row.key = Some(told.key().to_owned());
+        row
     }
 
     /// Draws a population at the size at which it evolved.
@@ -155,14 +167,8 @@ impl<'a> Shooter<'a> {
     }
 
     /// Writes the files of a frame. The population comes first, since the others can be made again from it.
-    fn write(
-        &mut self,
-        frame: &Planned,
-        last: &Last,
-        ending: &Ending,
-        watcher: &Watcher<'_>,
-        row: &mut Row,
-    ) -> Result<()> {
+    /// Returns their paths.
+    fn write(&mut self, frame: &Planned, last: &Last, ending: &Ending, watcher: &Watcher<'_>) -> Result<Vec<String>> {
         let told =
             Told { picture: frame.picture.describe(Some(ending)), population: frame.population.describe(Some(ending)) };
         let destinations = self.store.destinations(frame.number)?;
@@ -175,7 +181,8 @@ impl<'a> Shooter<'a> {
         let destinations: Vec<_> = destinations.iter().collect();
         let files: Vec<EncodedFile<'_>> = outputs::encode(&destinations, &drawn, &told)?;
         files.iter().try_for_each(|file| self.store.check_remade(file))?;
-        outputs::write(&files, watcher.interrupt, &mut row.output)
+        let mut paths = Vec::new();
+        outputs::write(&files, watcher.interrupt, &mut paths).map(|()| paths)
     }
 
     fn load(&self, frame: &Planned) -> Result<Job> {

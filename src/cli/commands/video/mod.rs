@@ -30,7 +30,6 @@ use crate::cli::terminal::progress::Progress;
 use crate::cli::terminal::{self, Verbosity, advice};
 use crate::cli::{film as animation, trace};
 use crate::error::{Error, Result};
-use crate::studio::Scheme;
 
 /// Makes the frames and reports on them; returns the exit code of the process.
 pub(crate) fn make(args: &VideoArgs) -> ExitCode {
@@ -99,11 +98,7 @@ fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> R
     let made = planned.iter().try_for_each(|frame| {
         interrupt.check()?;
         watcher.evals = frame.evals;
-        let mut row = Row::new(&frame.input, args.picture.seed, Scheme::Cells);
-        row.device = Some(device.label().to_owned());
-        row.tiles = Some(frame.tiles);
-        row.key = Some(if options.folder.is_some() { frame.picture.key() } else { frame.population.key() }.to_owned());
-        let is_kept = make_frame(&mut shooter, &store, frame, &mut watcher, &mut row)?;
+        let Made { row, is_kept } = make_frame(&mut shooter, &store, frame, &mut watcher)?;
         let row = FrameRow { row: &row, frame: frame.number, begin: frame.begin, shot: frame.shot, is_kept };
         totals.note(&row);
         if args.json { terminal::print_json(&row) } else { Ok(()) }
@@ -121,28 +116,30 @@ fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> R
     Ok(())
 }
 
-/// Makes one frame, or the files that it lacks; returns whether it was complete already.
-fn make_frame(
-    shooter: &mut Shooter<'_>,
-    store: &Store,
-    frame: &Planned,
-    watcher: &mut Watcher<'_>,
-    row: &mut Row,
-) -> Result<bool> {
+/// A frame whose files are all there.
+struct Made {
+    row: Row,
+    /// Whether it was complete already.
+    is_kept: bool,
+}
+
+/// Makes one frame, or the files that it lacks.
+fn make_frame(shooter: &mut Shooter<'_>, store: &Store, frame: &Planned, watcher: &mut Watcher<'_>) -> Result<Made> {
     let is_whole = store.whole_population(frame).is_some();
     let is_kept = is_whole && store.has_picture(frame)?;
-    if is_whole {
-        shooter.redraw(frame, watcher, row)?;
+    let mut row = if is_whole {
+        shooter.redraw(frame, watcher)?
     } else {
-        shooter.shoot(frame, watcher, row)?;
+        let row = shooter.shoot(frame, watcher)?;
         watcher.evolved += 1;
-    }
+        row
+    };
     watcher.done += 1;
     row.status = Status::Complete;
     if row.output.is_empty() {
         row.output = store.destinations(frame.number)?.iter().map(|one| one.path.display().to_string()).collect();
     }
-    Ok(is_kept)
+    Ok(Made { row, is_kept })
 }
 
 /// Refuses to write frames into the folder that frames are read from.
