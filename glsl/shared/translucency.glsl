@@ -41,8 +41,8 @@ uint shown_over(Compositing pixel, uint background) {
 
 // The packed colour of the layers alone, not premultiplied, with their opacity in the highest byte; 0 if that is 0.
 uint shown_alone(Compositing pixel) {
-    uint weight = CLEAR - pixel.transmittance;
-    uint alpha = weight * 255u + CLEAR / 2u >> 16;
-    uvec3 shown = (pixel.sums + weight / 2u) / max(weight, 1u);
+    uint alpha = (CLEAR - pixel.transmittance) * 255u + CLEAR / 2u >> 16;
+    uvec3 over_black = pixel.sums + CLEAR / 2u >> 16;
+    uvec3 shown = (over_black * 255u + alpha / 2u) / max(alpha, 1u);
     return alpha == 0u ? 0u : shown.x | shown.y << 8 | shown.z << 16 | alpha << 24;
 }

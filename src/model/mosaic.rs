@@ -1,5 +1,7 @@
 //! The rendered picture, put together patch by patch from samples.
 
+use std::borrow::Cow;
+
 use super::population::Backdrop;
 use super::target::Rgb;
 use super::tile::{Canvas, unpack};
@@ -37,6 +39,17 @@ impl Mosaic {
         let pixel_count = canvas.width_px as usize * canvas.height_px as usize;
         let alpha = (backdrop == Backdrop::Transparent).then(|| vec![0; pixel_count]);
         Self { width_px: canvas.width_px, height_px: canvas.height_px, pixels: vec![[0; 3]; pixel_count], alpha }
+    }
+
+    /// The colours over black. This is what a search scores where nothing lies behind the tiles: what a tile does not
+    /// cover counts as black, and what it covers in part, as partly black.
+    #[must_use]
+    pub fn over_black(&self) -> Cow<'_, [Rgb]> {
+        let Some(alpha) = &self.alpha else { return Cow::Borrowed(&self.pixels) };
+        let darkened = |(color, &alpha): (&Rgb, &u8)| {
+            color.map(|channel| ((u32::from(channel) * u32::from(alpha) + 127) / 255) as u8)
+        };
+        Cow::Owned(self.pixels.iter().zip(alpha).map(darkened).collect())
     }
 
     /// Writes the pixels of a patch of samples: each pixel is the mean of `supersampling`² samples, rounded half up.

@@ -97,13 +97,15 @@ impl Compositing {
 
     /// The colour of the layers alone, not premultiplied, packed with their opacity in the highest byte; 0 if that is
     /// 0.
+    ///
+    /// The colour is the one over black, divided by the opacity. So over black, rounded, it is again exactly what
+    /// [`Compositing::over`] gives, which is what a search scores.
     #[inline]
     #[must_use]
     pub fn alone(self) -> u32 {
-        let weight = CLEAR - self.transmittance;
-        match channel(weight * 255) {
+        match channel((CLEAR - self.transmittance) * 255) {
             0 => 0,
-            alpha => pack(self.sums.map(|sum| ((sum + weight / 2) / weight) as u8)) | alpha << 24,
+            alpha => pack(self.sums.map(|sum| ((channel(sum) * 255 + alpha / 2) / alpha) as u8)) | alpha << 24,
         }
     }
 

@@ -1,9 +1,12 @@
 //! Animations frame by frame: APNG without loss, and GIF. Memory does not grow with the number of frames, and the same
 //! frames give the same bytes.
 //!
-//! Only the box around the pixels that changed is stored, and in it every pixel that did not change is transparent.
-//! That saves bytes. In a GIF it also gives finer colours, since the palette of a frame serves its changed pixels
-//! alone, and unchanged pixels do not flicker.
+//! Of opaque frames only the box around the pixels that changed is stored, and in it every pixel that did not change is
+//! transparent. That saves bytes. In a GIF it also gives finer colours, since the palette of a frame serves its changed
+//! pixels alone, and unchanged pixels do not flicker.
+//!
+//! Where frames are transparent themselves, that cannot be: an APNG stores the whole box, and a GIF every frame anew. A
+//! GIF knows no partial transparency: what is less than half opaque is clear there, and the rest is opaque.
 
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -13,6 +16,7 @@ use png::{BlendOp, DeflateCompression};
 
 use super::metadata::Metadata;
 use super::palette::{COLOR_COUNT_MAX, nearest, palette_of};
+use crate::model::Mosaic;
 
 /// Most frames a second of a GIF: viewers show shorter delays as a tenth of a second.
 pub const GIF_FRAMES_PER_S_MAX: u16 = 50;
@@ -47,6 +51,31 @@ impl Timing {
     }
 }
 
+/// The frames of an animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    /// Width and height of each, in px.
+    pub size_px: (u32, u32),
+    /// When they are shown.
+    pub timing: Timing,
+    /// Whether they may be transparent. If not, a frame with alpha is shown over black.
+    pub has_alpha: bool,
+}
+
+/// A colour and its opacity.
+type Rgba = [u8; 4];
+
+/// The least opacity of a pixel that a GIF shows.
+const GIF_ALPHA_MIN: u8 = 128;
+
+/// The pixels of a frame, all of them opaque unless `has_alpha`.
+fn rgba(frame: &Mosaic, has_alpha: bool) -> Vec<Rgba> {
+    match frame.alpha.as_ref().filter(|_| has_alpha) {
+        Some(alpha) => frame.pixels.iter().zip(alpha).map(|(&[r, g, b], &a)| [r, g, b, a]).collect(),
+        None => frame.over_black().iter().map(|&[r, g, b]| [r, g, b, 255]).collect(),
+    }
+}
+
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Area {
@@ -60,14 +89,14 @@ struct Area {
 struct Changes {
     area: Area,
     /// The pixels of the area, row by row; `None` where a pixel did not change.
-    pixels: Vec<Option<[u8; 3]>>,
+    pixels: Vec<Option<Rgba>>,
 }
 
 /// The previous frame, with which the next one is compared.
 #[derive(Debug)]
 struct Screen {
     width_px: usize,
-    shown: Vec<[u8; 3]>,
+    shown: Vec<Rgba>,
 }
 
 impl Screen {
@@ -77,17 +106,29 @@ impl Screen {
 
     /// Shows `pixels` and returns what changed: everything on the first frame, and an area of at least one pixel on any
     /// other.
-    fn show(&mut self, pixels: &[[u8; 3]]) -> Changes {
+    fn show(&mut self, pixels: &[Rgba]) -> Changes {
         let is_first = self.shown.is_empty();
         let has_changed = |place: &usize| is_first || self.shown[*place] != pixels[*place];
         let area = self.bounds((0..pixels.len()).filter(has_changed));
-        let rows = (area.y..area.y + area.height_px).map(|y| y * self.width_px + area.x);
-        let places = rows.flat_map(|start| start..start + area.width_px);
         let pixel = |place| has_changed(&place).then_some(pixels[place]);
-        let changes = Changes { area, pixels: places.map(pixel).collect() };
+        let changes = Changes { area, pixels: self.places(area).map(pixel).collect() };
         self.shown.clear();
         self.shown.extend_from_slice(pixels);
         changes
+    }
+
+    /// The pixels of a frame that a GIF shows.
+    fn solid(&self, pixels: &[Rgba]) -> Changes {
+        let is_shown = |place: &usize| pixels[*place][3] >= GIF_ALPHA_MIN;
+        let area = self.bounds((0..pixels.len()).filter(is_shown));
+        let pixel = |place| is_shown(&place).then_some(pixels[place]);
+        Changes { area, pixels: self.places(area).map(pixel).collect() }
+    }
+
+    /// The places of an area, row by row.
+    fn places(&self, area: Area) -> impl Iterator<Item = usize> {
+        let rows = (area.y..area.y + area.height_px).map(move |y| y * self.width_px + area.x);
+        rows.flat_map(move |start| start..start + area.width_px)
     }
 
     /// The smallest area around some places; the pixel in the corner if there are none.
@@ -106,16 +147,17 @@ impl Screen {
 pub struct ApngEncoder<W: Write> {
     writer: png::Writer<W>,
     screen: Screen,
-    timing: Timing,
+    frames: Frames,
     next: u32,
 }
 
 impl<W: Write> ApngEncoder<W> {
-    /// Begins an animation with frames of `size_px` (width, height).
+    /// Begins an animation.
     ///
     /// # Errors
     /// If `out` cannot be written, or the width, the height or the number of frames is 0.
-    pub fn new(out: W, size_px: (u32, u32), timing: Timing, metadata: &Metadata) -> io::Result<Self> {
+    pub fn new(out: W, frames: Frames, metadata: &Metadata) -> io::Result<Self> {
+        let Frames { size_px, timing, .. } = frames;
         let mut encoder = png::Encoder::new(out, size_px.0, size_px.1);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
@@ -128,27 +170,32 @@ impl<W: Write> ApngEncoder<W> {
         for (keyword, text) in metadata.iter().cloned() {
             encoder.add_itxt_chunk(keyword, text)?;
         }
-        Ok(Self { writer: encoder.write_header()?, screen: Screen::new(size_px.0), timing, next: 0 })
+        Ok(Self { writer: encoder.write_header()?, screen: Screen::new(size_px.0), frames, next: 0 })
     }
 
-    /// Adds the next frame, row by row from the top.
+    /// Adds the next frame.
     ///
     /// # Errors
     /// If it cannot be written, or if it is one frame too many.
-    pub fn add(&mut self, pixels: &[[u8; 3]]) -> io::Result<()> {
-        let Changes { area, pixels } = self.screen.show(pixels);
+    pub fn add(&mut self, frame: &Mosaic) -> io::Result<()> {
+        let Frames { timing, has_alpha, .. } = self.frames;
+        let frame = rgba(frame, has_alpha);
+        let Changes { area, pixels } = self.screen.show(&frame);
         if self.next > 0 {
             // The encoder checks that the frame lies within the picture after each call; in this order it always does.
             self.writer.reset_frame_position()?;
             self.writer.set_frame_dimension(area.width_px as u32, area.height_px as u32)?;
             self.writer.set_frame_position(area.x as u32, area.y as u32)?;
-            self.writer.set_blend_op(BlendOp::Over)?;
+            self.writer.set_blend_op(if has_alpha { BlendOp::Source } else { BlendOp::Over })?;
         }
-        if self.next + 1 == self.timing.frame_count {
-            self.writer.set_frame_delay(self.timing.last_cs, 100)?;
+        if self.next + 1 == timing.frame_count {
+            self.writer.set_frame_delay(timing.last_cs, 100)?;
         }
-        let rgba = |pixel: Option<[u8; 3]>| pixel.map_or([0; 4], |[r, g, b]| [r, g, b, 255]);
-        let samples: Vec<[u8; 4]> = pixels.into_iter().map(rgba).collect();
+        let samples: Vec<Rgba> = if has_alpha {
+            self.screen.places(area).map(|place| frame[place]).collect()
+        } else {
+            pixels.into_iter().map(Option::unwrap_or_default).collect()
+        };
         self.writer.write_image_data(samples.as_flattened())?;
         self.next += 1;
         Ok(())
@@ -167,16 +214,17 @@ impl<W: Write> ApngEncoder<W> {
 pub struct GifEncoder<W: Write> {
     encoder: gif::Encoder<W>,
     screen: Screen,
-    timing: Timing,
+    frames: Frames,
     next: u32,
 }
 
 impl<W: Write> GifEncoder<W> {
-    /// Begins an animation with frames of `size_px` (width, height), each at most 65,535.
+    /// Begins an animation with frames of at most 65,535 px along a side.
     ///
     /// # Errors
     /// If `out` cannot be written, or a side is too long.
-    pub fn new(out: W, size_px: (u32, u32), timing: Timing, metadata: &Metadata) -> io::Result<Self> {
+    pub fn new(out: W, frames: Frames, metadata: &Metadata) -> io::Result<Self> {
+        let Frames { size_px, timing, .. } = frames;
         let side = |px| u16::try_from(px).map_err(|_| io::Error::other("a GIF has at most 65,535 px along a side"));
         let mut encoder = gif::Encoder::new(out, side(size_px.0)?, side(size_px.1)?, &[]).map_err(gif_failure)?;
         if timing.plays != 1 {
@@ -189,31 +237,35 @@ impl<W: Write> GifEncoder<W> {
             let blocks: Vec<&[u8]> = comment.as_bytes().chunks(GIF_BLOCK_BYTES).collect();
             encoder.write_raw_extension(gif::AnyExtension(GIF_COMMENT), &blocks).map_err(gif_failure)?;
         }
-        Ok(Self { encoder, screen: Screen::new(size_px.0), timing, next: 0 })
+        Ok(Self { encoder, screen: Screen::new(size_px.0), frames, next: 0 })
     }
 
-    /// Adds the next frame, row by row from the top.
+    /// Adds the next frame.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn add(&mut self, pixels: &[[u8; 3]]) -> io::Result<()> {
-        let Changes { area, pixels } = self.screen.show(pixels);
-        let changed: Vec<[u8; 3]> = pixels.iter().flatten().copied().collect();
+    pub fn add(&mut self, frame: &Mosaic) -> io::Result<()> {
+        let Frames { timing, has_alpha, .. } = self.frames;
+        let frame = rgba(frame, has_alpha);
+        let Changes { area, pixels } = if has_alpha { self.screen.solid(&frame) } else { self.screen.show(&frame) };
+        let changed: Vec<[u8; 3]> = pixels.iter().flatten().map(|&[r, g, b, _]| [r, g, b]).collect();
         let palette = match changed.len() {
             0 => Vec::new(),
             _ => palette_of(&changed, COLOR_COUNT_MAX - 1).map_err(io::Error::other)?,
         };
         let transparent = palette.len() as u8;
         let mut indices = HashMap::new();
-        let mut index_of = |color: [u8; 3]| -> u8 {
+        let mut index_of = |[r, g, b, _]: Rgba| -> u8 {
+            let color = [r, g, b];
             // The search needs the palette in rising order, which it is.
             *indices
                 .entry(color)
                 .or_insert_with(|| palette.binary_search(&nearest(color, &palette)).unwrap_or_default() as u8)
         };
         let frame = Frame {
-            delay: self.timing.delay_cs(self.next),
-            dispose: DisposalMethod::Keep,
+            delay: timing.delay_cs(self.next),
+            // Cleared before the next one, where the next one may have holes.
+            dispose: if has_alpha { DisposalMethod::Background } else { DisposalMethod::Keep },
             transparent: Some(transparent),
             left: area.x as u16,
             top: area.y as u16,
@@ -267,15 +319,15 @@ mod tests {
     #[test]
     fn only_the_box_around_what_changed_is_kept() {
         let mut screen = Screen::new(4);
-        let mut pixels = vec![[1; 3]; 12];
+        let mut pixels = vec![[1; 4]; 12];
         let all = screen.show(&pixels);
         assert_eq!(all.area, Area { x: 0, y: 0, width_px: 4, height_px: 3 });
         assert!(all.pixels.iter().all(Option::is_some));
-        pixels[5] = [2; 3];
-        pixels[10] = [3; 3];
+        pixels[5] = [2; 4];
+        pixels[10] = [3; 4];
         let some = screen.show(&pixels);
         assert_eq!(some.area, Area { x: 1, y: 1, width_px: 2, height_px: 2 });
-        assert_eq!(some.pixels, [Some([2; 3]), None, None, Some([3; 3])]);
+        assert_eq!(some.pixels, [Some([2; 4]), None, None, Some([3; 4])]);
         let none = screen.show(&pixels);
         assert_eq!(none.area, Area { x: 0, y: 0, width_px: 1, height_px: 1 });
         assert_eq!(none.pixels, [None]);
@@ -283,14 +335,16 @@ mod tests {
 
     #[test]
     fn frames_that_are_missing_or_too_many_are_errors() {
+        let frames = Frames { size_px: (1, 1), timing: timing(2, 20), has_alpha: false };
+        let frame = Mosaic { width_px: 1, height_px: 1, pixels: vec![[1; 3]], alpha: None };
         let mut out = Vec::new();
-        let mut encoder = ApngEncoder::new(&mut out, (1, 1), timing(2, 20), &Vec::new()).expect("it begins");
-        encoder.add(&[[1; 3]]).expect("the first frame");
-        encoder.add(&[[1; 3]]).expect("the second frame");
-        assert!(encoder.add(&[[1; 3]]).is_err());
+        let mut encoder = ApngEncoder::new(&mut out, frames, &Vec::new()).expect("it begins");
+        encoder.add(&frame).expect("the first frame");
+        encoder.add(&frame).expect("the second frame");
+        assert!(encoder.add(&frame).is_err());
         let mut out = Vec::new();
-        let mut encoder = ApngEncoder::new(&mut out, (1, 1), timing(2, 20), &Vec::new()).expect("it begins");
-        encoder.add(&[[1; 3]]).expect("the first frame");
+        let mut encoder = ApngEncoder::new(&mut out, frames, &Vec::new()).expect("it begins");
+        encoder.add(&frame).expect("the first frame");
         assert!(encoder.finish().is_err());
     }
 }

@@ -18,7 +18,7 @@ mod webp;
 mod weights;
 pub(crate) mod xml;
 
-pub use animation::{ApngEncoder, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
+pub use animation::{ApngEncoder, Frames, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
 pub(crate) use decode::why_unreadable;
 pub use decode::{
     Background, Decoded, Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, decoding_bytes, is_whole, read,

@@ -185,8 +185,9 @@ fn undrawn() -> Error {
     Error::Internal("an output was not drawn".to_owned())
 }
 
-/// How far a mosaic is from its target where tiles are wanted.
-pub(crate) fn difference(pixels: &[Rgb], target: &Target) -> Difference {
+/// How far a mosaic is from its target where tiles are wanted, over black if nothing lies behind its tiles.
+pub(crate) fn difference(mosaic: &Mosaic, target: &Target) -> Difference {
+    let pixels = &mosaic.over_black();
     let Some(transparent) = target.transparent() else { return Difference::between(pixels, target.pixels()) };
     let wanted = |pixels: &[Rgb]| -> Vec<Rgb> {
         let wanted = pixels.iter().zip(transparent).filter(|&(_, &is_transparent)| !is_transparent);

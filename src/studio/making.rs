@@ -107,7 +107,7 @@ pub(crate) fn finish(job: &Job, ended: Ended, painter: &mut dyn Painter, resized
     let (width_px, height_px) = (job.target.width_px(), job.target.height_px());
     let population = job.population(flies);
     let mosaic = painter.draw(&population, &Canvas::evaluation(width_px, height_px), 1)?;
-    let difference = difference(&mosaic.pixels, &job.target);
+    let difference = difference(&mosaic, &job.target);
     let (scored, drawn) = (ending.sae, difference.sae());
     if drawn != scored {
         return Err(Error::Internal(format!("the best population had an SAE of {scored} and is drawn with {drawn}")));

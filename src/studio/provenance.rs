@@ -135,7 +135,7 @@ impl Provenance {
 
     /// Something that decides the result.
     pub(crate) fn decisive(&self, word: &str) -> &Value {
-        &self.decisive[word]
+        self.decisive.get(word).unwrap_or(&Value::Null)
     }
 
     /// SHA-256 over everything that decides the result, 64 lower-case hexadecimal digits.

@@ -10,7 +10,7 @@ use super::AnimationFile;
 use crate::cli::files::child::in_its_own_group;
 use crate::error::{Error, Result};
 use crate::model::Mosaic;
-use crate::photo::Timing;
+use crate::photo::Frames;
 
 /// The program, which the system finds in the user's `PATH`.
 const PROGRAM: &str = "ffmpeg";
@@ -65,12 +65,6 @@ pub(super) struct Ffmpeg {
     hold_frames: u32,
 }
 
-/// The frames that a video is made of.
-pub(super) struct Frames {
-    pub size_px: (u32, u32),
-    pub timing: Timing,
-}
-
 impl Ffmpeg {
     /// Starts to encode frames into the file at `growing_path`. `comment` becomes the file's metadata.
     ///
@@ -83,7 +77,7 @@ impl Ffmpeg {
         frames: &Frames,
         comment: &str,
     ) -> Result<Self> {
-        let Frames { size_px, timing } = frames;
+        let Frames { size_px, timing, .. } = frames;
         let (width_px, height_px) = (size_px.0.next_multiple_of(2), size_px.1.next_multiple_of(2));
         // Without the prefix ffmpeg would take a colon in the path for the end of a protocol's name.
         let mut file = OsString::from("file:");
@@ -176,19 +170,20 @@ fn not_started(path: &Path, error: &io::Error) -> Error {
     Error::output(path, format!("{reason}, or write .png or .gif"))
 }
 
-/// The frame with even sides, as 4:2:0 needs them. An odd side gets its last column or row twice.
+/// The frame with even sides, as 4:2:0 needs them, over black where it is transparent. An odd side gets its last column or row twice.
 fn even(frame: &Mosaic) -> Vec<u8> {
     let width_px = frame.width_px as usize;
-    let mut bytes = Vec::with_capacity((frame.pixels.len() + 2 * width_px + frame.height_px as usize) * 3);
+    let pixels = frame.over_black();
+    let mut bytes = Vec::with_capacity((pixels.len() + 2 * width_px + frame.height_px as usize) * 3);
     let mut add_row = |row: &[[u8; 3]]| {
         bytes.extend_from_slice(row.as_flattened());
         if let Some(last) = row.last().filter(|_| row.len() % 2 == 1) {
             bytes.extend_from_slice(last);
         }
     };
-    frame.pixels.chunks_exact(width_px).for_each(&mut add_row);
+    pixels.chunks_exact(width_px).for_each(&mut add_row);
     if frame.height_px % 2 == 1 {
-        frame.pixels.chunks_exact(width_px).last().into_iter().for_each(&mut add_row);
+        pixels.chunks_exact(width_px).last().into_iter().for_each(&mut add_row);
     }
     bytes
 }

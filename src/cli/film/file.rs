@@ -21,6 +21,13 @@ pub(crate) enum AnimationFormat {
     WebM,
 }
 
+impl AnimationFormat {
+    /// Whether its frames may be transparent.
+    pub(crate) fn has_alpha(self) -> bool {
+        matches!(self, Self::Apng | Self::Gif)
+    }
+}
+
 /// A file to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct AnimationFile {

@@ -10,14 +10,21 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 
 pub(super) use self::apart::take_apart;
-use self::ffmpeg::{Codec, Ffmpeg, Frames};
+use self::ffmpeg::{Codec, Ffmpeg};
 pub(super) use self::file::{AnimationFile, AnimationFormat, FRAMES_PER_S_MAX, check_writable};
 pub(super) use self::provenance::{AnimationProvenance, check_replaceable};
 pub(super) use self::shooting::{Camera, End, Shown, shoot};
+use crate::cli::terminal;
 use crate::error::{Error, Result};
-use crate::model::{Canvas, Mosaic};
+use crate::model::Mosaic;
 use crate::output::PartialFile;
-use crate::photo::{ApngEncoder, GifEncoder, Timing};
+use crate::photo::{ApngEncoder, Frames, GifEncoder};
+
+/// Says that a transparent mosaic is shown over black in this file.
+pub(crate) fn say_shown_over_black(output: &AnimationFile) {
+    let path = output.path.display();
+    terminal::say(&format!("smalti: {path} cannot be transparent, so the mosaic is shown over black"));
+}
 
 /// An animation that grows frame by frame. If this is dropped before the end, no file remains.
 pub(crate) struct Film {
@@ -37,26 +44,15 @@ impl Film {
     ///
     /// # Errors
     /// [`Error::Output`] if it cannot be written, or a program that it needs is missing.
-    pub(crate) fn open(
-        output: &AnimationFile,
-        canvas: &Canvas,
-        timing: Timing,
-        provenance: &AnimationProvenance,
-    ) -> Result<Self> {
+    pub(crate) fn open(output: &AnimationFile, frames: Frames, provenance: &AnimationProvenance) -> Result<Self> {
         let file = PartialFile::create(&output.path)?;
-        let size_px = (canvas.width_px, canvas.height_px);
         let metadata = provenance.metadata();
         let writer = || file.writer().map(BufWriter::new);
         let failed = |error: io::Error| file.failure(&error);
-        let frames = Frames { size_px, timing };
         let ffmpeg = |codec| Ffmpeg::start(output, codec, file.growing_path(), &frames, &provenance.text);
         let encoder = match output.format {
-            AnimationFormat::Apng => {
-                Encoder::Apng(ApngEncoder::new(writer()?, size_px, timing, &metadata).map_err(failed)?)
-            }
-            AnimationFormat::Gif => {
-                Encoder::Gif(GifEncoder::new(writer()?, size_px, timing, &metadata).map_err(failed)?)
-            }
+            AnimationFormat::Apng => Encoder::Apng(ApngEncoder::new(writer()?, frames, &metadata).map_err(failed)?),
+            AnimationFormat::Gif => Encoder::Gif(GifEncoder::new(writer()?, frames, &metadata).map_err(failed)?),
             AnimationFormat::Mp4 => Encoder::Ffmpeg(ffmpeg(Codec::H264)?),
             AnimationFormat::WebM => Encoder::Ffmpeg(ffmpeg(Codec::Vp9)?),
         };
@@ -70,8 +66,8 @@ impl Film {
     pub(crate) fn add(&mut self, frame: &Mosaic) -> Result<()> {
         let failed = |error: io::Error| self.file.failure(&error);
         match &mut self.encoder {
-            Encoder::Apng(encoder) => encoder.add(&frame.pixels).map_err(failed),
-            Encoder::Gif(encoder) => encoder.add(&frame.pixels).map_err(failed),
+            Encoder::Apng(encoder) => encoder.add(frame).map_err(failed),
+            Encoder::Gif(encoder) => encoder.add(frame).map_err(failed),
             Encoder::Ffmpeg(ffmpeg) => ffmpeg.add(frame),
         }
     }

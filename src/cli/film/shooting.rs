@@ -15,7 +15,8 @@ use crate::cli::files::memory;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::{Progress, Stage, short_time};
 use crate::error::{Error, Result};
-use crate::model::{Canvas, Mosaic, Painter, Population, Rgb};
+use crate::model::{Backdrop, Canvas, Mosaic, Painter, Population, Rgb};
+use crate::photo::{Frames, Timing};
 use crate::studio::{Device, estimate_bytes, usual_supersampling};
 
 /// How many frames may wait for each output's encoder.
@@ -33,7 +34,7 @@ pub(crate) enum End {
 pub(crate) struct Shown {
     /// Longer side of the frames in px; `None` draws them as evolved.
     pub long_side_px: Option<u32>,
-    /// `None` takes the background of the populations.
+    /// `None` takes the background of the populations, which may be transparent.
     pub background: Option<Rgb>,
     pub film_count: usize,
 }
@@ -134,14 +135,18 @@ impl Camera {
         })
     }
 
+    /// The frames of this camera in an animation.
+    pub(crate) fn frames(&self, timing: Timing, has_alpha: bool) -> Frames {
+        Frames { size_px: (self.canvas.width_px, self.canvas.height_px), timing, has_alpha }
+    }
+
     /// The frame of the population at `path`.
     fn draw(&mut self, path: &Path) -> Result<Mosaic> {
         let mut population = archive::read(path)?.population;
         if (population.width_px, population.height_px) != self.size_px {
             return Err(Error::input(path, "differs in size from the first population; remove it"));
         }
-        // Animations have no alpha.
-        population.background = self.background.unwrap_or(population.background.color()).into();
+        population.background = self.background.map_or(population.background, Backdrop::from);
         self.painter.draw(&population, &self.canvas, self.supersampling)
     }
 }

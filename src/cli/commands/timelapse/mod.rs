@@ -16,7 +16,7 @@ use crate::cli::terminal::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use crate::cli::terminal::progress::Progress;
 use crate::cli::terminal::{self, advice};
 use crate::error::Result;
-use crate::model::Canvas;
+use crate::model::{Backdrop, Canvas};
 
 /// Makes animations and reports them; returns the exit code of the process.
 pub(crate) fn make(args: &TimelapseArgs) -> ExitCode {
@@ -45,12 +45,16 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
     let shown =
         Shown { long_side_px: options.long_side_px, background: options.background, film_count: options.outputs.len() };
     let mut camera = Camera::open(shown, &options.computing.select()?, &first)?;
-    let timing = options.timing(snapshots.len());
-    let provenance = provenance::of_animation(options, &snapshots, camera.canvas)?;
+    let has_alpha = options.background.is_none() && first.background == Backdrop::Transparent;
+    let frames = camera.frames(options.timing(snapshots.len()), has_alpha);
+    let provenance = provenance::of_animation(options, &snapshots, &frames)?;
     for output in &options.outputs {
         film::check_replaceable(&output.path, &provenance.key, options.overwrite)?;
     }
-    let open = |output| Film::open(output, &camera.canvas, timing, &provenance);
+    if has_alpha && !options.is_quiet {
+        options.outputs.iter().filter(|output| !output.format.has_alpha()).for_each(film::say_shown_over_black);
+    }
+    let open = |output| Film::open(output, frames, &provenance);
     let films = options.outputs.iter().map(open).collect::<Result<Vec<_>>>()?;
 
     let paths: Vec<&Path> = snapshots.iter().map(|snapshot| snapshot.path.as_path()).collect();

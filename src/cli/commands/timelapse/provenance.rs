@@ -9,7 +9,7 @@ use crate::archive;
 use crate::cli::files::snapshots::Snapshot;
 use crate::cli::film::AnimationProvenance;
 use crate::error::Result;
-use crate::model::Canvas;
+use crate::photo::Frames;
 use crate::studio::{SOFTWARE, hexadecimal};
 
 /// Metadata that differ from snapshot to snapshot.
@@ -22,18 +22,18 @@ const OF_SNAPSHOT: [&str; 8] = ["births", "evals", "sae", "objective", "run", "s
 pub(super) fn of_animation(
     options: &TimelapseOptions,
     snapshots: &[&Snapshot],
-    canvas: Canvas,
+    frames: &Frames,
 ) -> Result<AnimationProvenance> {
     let mut told: Map<String, Value> = archive::read_meta(&snapshots[0].path)?;
     told.retain(|key, _| !OF_SNAPSHOT.contains(&key.as_str()));
     let run_key = told.remove("key");
     let evals: Vec<u64> = snapshots.iter().map(|snapshot| snapshot.evals).collect();
-    let timing = options.timing(snapshots.len());
+    let Frames { size_px: (width_px, height_px), timing, has_alpha } = *frames;
     let specific = json!({
         "content": "timelapse",
         "run_key": run_key,
-        "width_px": canvas.width_px,
-        "height_px": canvas.height_px,
+        "width_px": width_px,
+        "height_px": height_px,
         "background": options.background.map(|color| hexadecimal(&color)),
         "spacing": match options.spacing { Spacing::Error => "error", Spacing::Births => "births", Spacing::Snapshots => "snapshots" },
         "frames_per_s": timing.frames_per_s,
@@ -43,6 +43,9 @@ pub(super) fn of_animation(
     });
     if let Value::Object(specific) = specific {
         told.extend(specific);
+    }
+    if has_alpha {
+        told.insert("transparent".to_owned(), true.into());
     }
     told.sort_keys();
     let key = hexadecimal(&Sha256::digest(Value::Object(told.clone()).to_string()));

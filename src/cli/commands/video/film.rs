@@ -9,6 +9,7 @@ use super::plan::Planned;
 use super::store::Store;
 use crate::archive;
 use crate::cli::film::{self, AnimationProvenance, Camera, End, Film, Shown};
+use crate::cli::terminal::Verbosity;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::Progress;
 use crate::error::{Error, Result};
@@ -44,10 +45,18 @@ fn provenance(options: &VideoOptions, sequence: Sequence<'_>) -> AnimationProven
         "frames_per_s": options.rate(input_frames_per_s),
         "output_size_px": options.pictures.output_long_side_px,
     });
-    let told: Map<String, Value> = if let Value::Object(told) = told { told } else { Map::new() };
+    let mut told: Map<String, Value> = if let Value::Object(told) = told { told } else { Map::new() };
+    if has_alpha(planned) {
+        told.insert("transparent".to_owned(), true.into());
+    }
     let provenance = Provenance::of(told);
     let text = Value::Object(provenance.describe(None)).to_string();
     AnimationProvenance { key: provenance.key().to_owned(), text }
+}
+
+/// Whether some frame may be transparent.
+fn has_alpha(planned: &[Planned]) -> bool {
+    planned.iter().any(|frame| !frame.population.decisive("transparent_sha256").is_null())
 }
 
 /// Makes the animations that were asked for; returns their paths.
@@ -73,7 +82,11 @@ pub(super) fn make(
     let last_cs = 100 / frames_per_s;
     let timing = Timing { frame_count: planned.len() as u32, frames_per_s, last_cs, plays: 0 };
     let provenance = provenance(options, sequence);
-    let open = |output| Film::open(output, &camera.canvas, timing, &provenance);
+    let frames = camera.frames(timing, has_alpha(planned));
+    if frames.has_alpha && options.pictures.verbosity > Verbosity::Quiet {
+        options.films.iter().filter(|output| !output.format.has_alpha()).for_each(film::say_shown_over_black);
+    }
+    let open = |output| Film::open(output, frames, &provenance);
     let films = options.films.iter().map(open).collect::<Result<Vec<_>>>()?;
     let (end, films) = film::shoot(films, &paths, &mut camera, interrupt, Progress::new(options.progress))?;
     if end == End::Interrupted {

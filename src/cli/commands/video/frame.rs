@@ -99,12 +99,12 @@ impl<'a> Shooter<'a> {
         let Ended { ending, flies, fitness } = ended;
         let population = job.population(flies);
         let mosaic = self.draw(&population)?;
-        let drawn = difference(&mosaic.pixels, &wanted).sae();
+        let drawn = difference(&mosaic, &wanted).sae();
         if drawn != ending.sae {
             let scored = ending.sae;
             return Err(Error::Internal(format!("a frame had an SAE of {scored} and is drawn with {drawn}")));
         }
-        let likeness = difference(&mosaic.pixels, &picture);
+        let likeness = difference(&mosaic, &picture);
         // Measured against the unchanged picture, not against the held values of its still pixels.
         let ending = Ending { sae: likeness.sae(), ..ending };
         row.note_population(&population);
@@ -256,11 +256,12 @@ impl<'a> Shooter<'a> {
 /// The budget of a frame with still pixels. A target for the SAE is for all pixels, so the SAE of the still ones is
 /// subtracted.
 fn of_rest(budget: Budget, held: &Held, shown: &Mosaic, target: &Target) -> Budget {
+    let shown = shown.over_black();
     let error = |pixel: usize| {
-        let pairs = shown.pixels[pixel].iter().zip(target.pixels()[pixel]);
+        let pairs = shown[pixel].iter().zip(target.pixels()[pixel]);
         pairs.map(|(&a, b)| u64::from(a.abs_diff(b))).sum::<u64>()
     };
-    let of_still: u64 = (0..shown.pixels.len()).filter(|&pixel| held.is_still(pixel)).map(error).sum();
+    let of_still: u64 = (0..shown.len()).filter(|&pixel| held.is_still(pixel)).map(error).sum();
     Budget { target_sae: budget.target_sae.map(|sae| sae.saturating_sub(of_still)), ..budget }
 }
 
