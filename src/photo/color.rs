@@ -8,7 +8,7 @@ use super::Background;
 use super::icc::Profile;
 
 /// The picture in sRGB over `background`, as RGB. If transparency is kept and some pixel is not opaque, it is RGBA
-/// instead, with colours composited on black.
+/// instead, with the colours that are stored, not multiplied by alpha.
 ///
 /// A profile that cannot be used is ignored with a warning.
 pub(super) fn to_srgb(
@@ -25,6 +25,7 @@ pub(super) fn to_srgb(
     match background {
         Background::Color(color) => Conversion { profile, background: color }.over_background(image).into(),
         Background::Transparent => {
+            // Nothing shows the background: here it only stands behind pictures that are opaque.
             let conversion = Conversion { profile, background: [0; 3] };
             if has_transparency(&image) {
                 conversion.with_alpha(image).into()
@@ -63,7 +64,7 @@ pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> Gray
         for &[r, g, b, alpha] in &row {
             let luma = u64::from(r) * 2126 + u64::from(g) * 7152 + u64::from(b) * 722;
             stencil.push(((luma + 10_000 * 257 / 2) / (10_000 * 257)) as u8);
-            stencil.push(((u32::from(alpha) + 128) / 257) as u8);
+            stencil.push(narrowed(alpha));
         }
     }
     GrayAlphaImage::from_raw(image.width(), image.height(), stencil).expect("every row has been converted")
@@ -97,6 +98,11 @@ fn widen(channel: u8) -> u16 {
     u16::from(channel) * 257
 }
 
+/// A 16-bit channel in 8 bits, rounded to the nearest.
+fn narrowed(channel: u16) -> u8 {
+    ((u32::from(channel) + 128) / 257) as u8
+}
+
 /// A float channel in 16 bits: [0, 1] becomes [0, 65,535], what lies outside is clipped, NaN is 0.
 fn quantised(channel: f32) -> u16 {
     (channel * 65_535.0 + 0.5) as u16
@@ -126,13 +132,11 @@ impl Conversion {
         RgbImage::from_raw(width_px, height_px, opaque).expect("every row has been converted")
     }
 
-    /// The picture over the background, and its alpha beside that.
+    /// The picture as it is stored, and its alpha beside that. A colour mixed with black would be a dark fringe around
+    /// everything that has soft edges.
     fn with_alpha(&self, image: DynamicImage) -> RgbaImage {
         let (width_px, height_px) = (image.width(), image.height());
-        let beside = |pixel: [u16; 4]| {
-            let [r, g, b] = self.composite(pixel);
-            [r, g, b, ((u32::from(pixel[3]) + 128) / 257) as u8]
-        };
+        let beside = |pixel: [u16; 4]| pixel.map(narrowed);
         let cut = match image {
             DynamicImage::ImageLumaA8(image) => self.convert(&image, widen, beside),
             DynamicImage::ImageRgba8(image) => self.convert(&image, widen, beside),

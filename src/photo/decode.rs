@@ -60,8 +60,8 @@ pub struct Loaded {
     /// Which pixels of `photo` are transparent, row by row: those with an alpha below 128 of 255. `None` if no pixel
     /// is, or if the picture was read over a colour.
     ///
-    /// These pixels are black. The others are composited on black, and no colour of a transparent pixel spills into
-    /// them.
+    /// These pixels are black. The others have their own colours, as if they were opaque, and no colour of a
+    /// transparent pixel spills into them.
     pub transparent: Option<Vec<bool>>,
     /// Width in px of the upright picture before it was fitted.
     pub original_width_px: u32,
@@ -76,7 +76,7 @@ pub struct Loaded {
 /// Reads the picture at `path`. Its content decides the format, not its name.
 ///
 /// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
-/// background (on black if that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The pixels
+/// background (unless that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The pixels
 /// are the same on every machine, except under an ICC profile that has tables and no matrix: there a processor's fused
 /// multiplications may change a channel by one.
 ///
