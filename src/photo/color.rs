@@ -5,7 +5,8 @@
 use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, Pixel, RgbImage, RgbaImage};
 
 use super::Background;
-use super::icc::Profile;
+use super::icc::{IDENTITY, Profile, Shaper};
+use super::raw::Space;
 
 /// The picture in sRGB over `background`, as RGB. If transparency is kept and some pixel is not opaque, it is RGBA
 /// instead, with the colours that are stored, not multiplied by alpha.
@@ -13,12 +14,11 @@ use super::icc::Profile;
 /// A profile that cannot be used is ignored with a warning.
 pub(super) fn to_srgb(
     image: DynamicImage,
-    icc: Option<&[u8]>,
+    space: &Space,
     background: Background,
     warnings: &mut Vec<String>,
 ) -> DynamicImage {
-    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, image.color().has_color()));
-    let profile = profile.unwrap_or_else(|reason| {
+    let profile = profile_of(space, image.color().has_color()).unwrap_or_else(|reason| {
         warnings.push(format!("its ICC profile is ignored, so colours may be off: {reason}"));
         Profile::Srgb
     });
@@ -32,6 +32,19 @@ pub(super) fn to_srgb(
             } else {
                 conversion.over_background(image).into()
             }
+        }
+    }
+}
+
+/// What a picture says of itself, which has colour or is grey, or the reason why it cannot be used.
+fn profile_of(space: &Space, has_color: bool) -> Result<Profile, String> {
+    match space {
+        Space::Srgb => Ok(Profile::Srgb),
+        Space::Icc(icc) => Profile::parse(icc, has_color),
+        Space::Png(space) => {
+            // Grey has no primaries.
+            let matrix = if has_color { space.matrix } else { IDENTITY };
+            Ok(Profile::Shaper(Box::new(Shaper::of_curve(|x| space.curve.light(x), matrix))))
         }
     }
 }
@@ -51,9 +64,8 @@ fn has_transparency(image: &DynamicImage) -> bool {
 /// The luma (weights of Rec. 709, of stored sRGB values) and the alpha of a picture.
 ///
 /// A profile that cannot be used is left out: it would hardly change the luma.
-pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> GrayAlphaImage {
-    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, image.color().has_color()));
-    let profile = profile.unwrap_or(Profile::Srgb);
+pub(super) fn to_luma_and_alpha(image: DynamicImage, space: &Space) -> GrayAlphaImage {
+    let profile = profile_of(space, image.color().has_color()).unwrap_or(Profile::Srgb);
     let image = image.into_rgba16();
     let mut stencil = Vec::with_capacity(image.width() as usize * image.height() as usize * 2);
     let (mut row, mut scratch) = (Vec::new(), Vec::new());
@@ -74,9 +86,9 @@ pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> Gray
 /// its profile, since somebody drew its values.
 ///
 /// A profile that cannot be used is left out: it would hardly change the luma.
-pub(super) fn to_luma_over_black(image: DynamicImage, icc: Option<&[u8]>) -> GrayImage {
-    let icc = icc.filter(|_| image.color().has_color());
-    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, true)).unwrap_or(Profile::Srgb);
+pub(super) fn to_luma_over_black(image: DynamicImage, space: &Space) -> GrayImage {
+    let has_color = image.color().has_color();
+    let profile = if has_color { profile_of(space, true).unwrap_or(Profile::Srgb) } else { Profile::Srgb };
     let image = image.into_rgba16();
     let mut lumas = Vec::with_capacity(image.width() as usize * image.height() as usize);
     let (mut row, mut scratch) = (Vec::new(), Vec::new());

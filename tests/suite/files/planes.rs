@@ -6,11 +6,12 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, RgbaImage};
 use smalti::Error;
-use smalti::photo::{Background, Loaded, ReadOptions, read, read_weights};
+use smalti::photo::{Background, CutShort, Loaded, ReadOptions, read, read_weights};
 
 use super::{load, load_with, noise, photo_path, short_hash};
 
-const CUT: ReadOptions = ReadOptions { background: Background::Transparent, long_side_px: None };
+const CUT: ReadOptions =
+    ReadOptions { background: Background::Transparent, long_side_px: None, cut_short: CutShort::Refuse };
 
 fn with_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
@@ -158,7 +159,7 @@ fn a_soft_edge_has_the_colour_of_what_it_is_the_edge_of_at_every_size() {
         }
     }
     // A background that was asked for still shows through.
-    let over = ReadOptions { background: Background::Color([0, 0, 255]), long_side_px: None };
+    let over = ReadOptions { background: Background::Color([0, 0, 255]), ..ReadOptions::default() };
     let flat = with_file(&bytes, |path| read(path, &over)).expect("the picture can be read");
     let mixed = flat.photo.pixels.iter().zip(logo.pixels()).filter(|(_, stored)| (1..255).contains(&stored.0[3]));
     for ([r, _, b], stored) in mixed {
@@ -198,7 +199,8 @@ fn an_opaque_picture_is_read_alike_with_and_without_transparency() {
 
 #[test]
 fn over_a_colour_nothing_is_transparent() {
-    let green = ReadOptions { background: Background::Color([0, 255, 0]), long_side_px: Some(20) };
+    let background = Background::Color([0, 255, 0]);
+    let green = ReadOptions { background, long_side_px: Some(20), ..ReadOptions::default() };
     assert_eq!(load_with("alpha.png", &green).transparent, None);
 }
 
@@ -254,9 +256,7 @@ fn a_reduced_cut_picture_is_within_rounding_of_means_weighed_by_alpha_in_double_
     let transparent = found.transparent.expect("the right half is, here and there");
     let mut compared = 0;
     for channel in 0..3 {
-        let weighed = image.pixels().map(|pixel| {
-            f64::from(pixel.0[channel]) * f64::from(pixel.0[3])
-        });
+        let weighed = image.pixels().map(|pixel| f64::from(pixel.0[channel]) * f64::from(pixel.0[3]));
         let sums = lanczos_in_double_precision(&weighed.collect::<Vec<f64>>(), from, to);
         for (index, (sum, alpha)) in sums.iter().zip(&fitted_alphas).enumerate() {
             if (alpha - 127.5).abs() < 0.01 {
@@ -275,14 +275,18 @@ fn a_reduced_cut_picture_is_within_rounding_of_means_weighed_by_alpha_in_double_
 }
 
 fn weights_of(bytes: &[u8], width_px: u32, height_px: u32) -> Vec<u8> {
-    with_file(bytes, |path| read_weights(path, width_px, height_px)).expect("the map fits")
+    with_file(bytes, |path| read_weights(path, (width_px, height_px), CutShort::Refuse)).expect("the map fits")
 }
 
 #[test]
 fn a_grey_map_is_taken_as_it_is_stored_whatever_its_profile() {
     let stored: Vec<u8> = load("grey.png").pixels.iter().map(|pixel| pixel[0]).collect();
     for name in ["grey.png", "linear_grey.png"] {
-        assert_eq!(read_weights(&photo_path(name), 63, 48).expect("the size is the same"), stored, "{name}");
+        assert_eq!(
+            read_weights(&photo_path(name), (63, 48), CutShort::Refuse).expect("the size is the same"),
+            stored,
+            "{name}"
+        );
     }
 }
 
@@ -301,8 +305,9 @@ fn a_map_in_colour_is_taken_by_its_luma_over_black() {
 
 #[test]
 fn exif_orientation_turns_a_map_upright() {
-    let stored = read_weights(&photo_path("plain.jpg"), 63, 48).expect("the size is the same");
-    let upright = read_weights(&photo_path("turned.jpg"), 48, 63).expect("the size is that of the upright map");
+    let stored = read_weights(&photo_path("plain.jpg"), (63, 48), CutShort::Refuse).expect("the size is the same");
+    let upright = read_weights(&photo_path("turned.jpg"), (48, 63), CutShort::Refuse)
+        .expect("the size is that of the upright map");
     for (index, &luma) in upright.iter().enumerate() {
         let (x, y) = (index % 48, index / 48);
         assert_eq!(luma, stored[(47 - x) * 63 + y], "({x}, {y})");
@@ -327,7 +332,7 @@ fn a_map_is_fitted_to_the_size_of_the_picture_whether_it_is_larger_or_smaller() 
 
 /// The reason for which a map of these bytes is refused for a picture of this size.
 fn refusal(bytes: &[u8], width_px: u32, height_px: u32) -> String {
-    with_file(bytes, |map| match read_weights(map, width_px, height_px) {
+    with_file(bytes, |map| match read_weights(map, (width_px, height_px), CutShort::Refuse) {
         Err(Error::Input { path, reason }) if path == map => reason,
         other => panic!("{:?} is no refusal of the map", other.map(|lumas| lumas.len())),
     })

@@ -16,6 +16,7 @@ use sha2::{Digest, Sha256};
 use super::options::Span;
 use crate::cli::files::destination;
 use crate::cli::files::inputs::in_folder;
+use crate::cli::files::left_out::LeftOut;
 use crate::cli::film;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
@@ -89,7 +90,7 @@ impl Kept<'_> {
         let partial = PartialFolder::create_in(parent)?;
         let frames_per_s = film::take_apart(video, partial.path(), self.interrupt)?;
         let paths =
-            in_folder(partial.path()).map_err(|_| Error::input(video, "has no frames that ffmpeg could read"))?;
+            in_folder(partial.path(), &mut LeftOut::default()).map_err(|_| Error::input(video, "has no frames that ffmpeg could read"))?;
         let frames = paths.par_iter().map(|path| self.entry(path)).collect::<Result<_>>()?;
         let index = Index { software: SOFTWARE.to_owned(), sha256, frames_per_s, frames };
         self.interrupt.while_writing(|| self.settle(partial, &index))
