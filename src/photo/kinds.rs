@@ -231,11 +231,11 @@ mod tests {
     fn no_bytes_lead_out_of_the_file() {
         let brands = b"\0\0\0\x18ftypmif1\0\0\0\0mif1heic";
         for cut in 0..brands.len() {
-            kind_of(&brands[..cut]);
+            let _ = kind_of(&brands[..cut]);
             for value in 0..=255 {
                 let mut damaged = brands.to_vec();
                 damaged[cut] = value;
-                kind_of(&damaged);
+                let _ = kind_of(&damaged);
             }
         }
     }
