@@ -17,6 +17,7 @@ mod icc;
 mod jpeg_segments;
 mod kinds;
 mod metadata;
+mod moving;
 mod palette;
 mod png_space;
 mod raw;
@@ -34,6 +35,7 @@ pub use encode::{Format, encode, encode_jpeg, encode_png, encode_png_with_alpha,
 pub use kinds::{Foreign, Kind, kind_of};
 pub(crate) use metadata::png_metadata;
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
+pub use moving::{MovingFrame, frame_count, take_apart};
 pub use palette::{COLOR_COUNT_MAX, palette_of, read_palette, reduce};
 pub use raw::{CutShort, PIXEL_COUNT_MAX, SIDE_MAX_PX};
 pub use resize::fitted;

@@ -216,3 +216,24 @@ fn a_batch_says_what_it_leaves_out_and_a_folder_of_only_that_is_refused() {
         assert!(ran.stderr.contains("2 HEIC (convert it first, for instance with heif-convert)"), "{}", ran.stderr);
     }
 }
+
+#[test]
+fn an_animation_gives_its_frames_and_their_times_without_ffmpeg() {
+    let workshop = Workshop::new();
+    for (name, count) in [("animated.png", 3), ("animated.webp", 3), ("two_frames.gif", 2)] {
+        fs::copy(photo_path(name), workshop.path(name)).expect("it can be copied");
+        let mut command = workshop.command(&format!("video {name} -o out-{name}.frames/ -n 20 --evals 100"));
+        let output = command.env("PATH", "").output().expect("the program starts");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{name}: {stderr}");
+        let frames: Vec<_> = fs::read_dir(workshop.path(&format!("out-{name}.frames")))
+            .expect("it is there")
+            .map(|entry| entry.expect("it can be read").file_name().to_string_lossy().into_owned())
+            .filter(|name| name.ends_with(".png"))
+            .collect();
+        assert_eq!(frames.len(), count, "{name}: {frames:?}");
+        let index = workshop.read(&format!("out-{name}.frames/populations/input/video.json"));
+        let index: serde_json::Value = serde_json::from_slice(&index).expect("it is JSON");
+        assert_eq!(index["frames_per_s"], 10, "{name}");
+    }
+}
