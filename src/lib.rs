@@ -57,6 +57,7 @@ pub mod evolve;
 pub mod gpu;
 #[doc(hidden)]
 pub mod guide;
+mod memory;
 #[doc(hidden)]
 pub mod metrics;
 #[doc(hidden)]

@@ -5,32 +5,46 @@
 use image::{DynamicImage, GrayAlphaImage, GrayImage, ImageBuffer, Pixel, RgbImage, RgbaImage};
 
 use super::Background;
-use super::icc::Profile;
+use super::icc::{IDENTITY, Profile, Shaper};
+use super::raw::Space;
 
 /// The picture in sRGB over `background`, as RGB. If transparency is kept and some pixel is not opaque, it is RGBA
-/// instead, with colours composited on black.
+/// instead, with the colours that are stored, not multiplied by alpha.
 ///
 /// A profile that cannot be used is ignored with a warning.
 pub(super) fn to_srgb(
     image: DynamicImage,
-    icc: Option<&[u8]>,
+    space: &Space,
     background: Background,
     warnings: &mut Vec<String>,
 ) -> DynamicImage {
-    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, image.color().has_color()));
-    let profile = profile.unwrap_or_else(|reason| {
+    let profile = profile_of(space, image.color().has_color()).unwrap_or_else(|reason| {
         warnings.push(format!("its ICC profile is ignored, so colours may be off: {reason}"));
         Profile::Srgb
     });
     match background {
         Background::Color(color) => Conversion { profile, background: color }.over_background(image).into(),
         Background::Transparent => {
+            // Nothing shows the background: here it only stands behind pictures that are opaque.
             let conversion = Conversion { profile, background: [0; 3] };
             if has_transparency(&image) {
                 conversion.with_alpha(image).into()
             } else {
                 conversion.over_background(image).into()
             }
+        }
+    }
+}
+
+/// What a picture says of itself, which has colour or is grey, or the reason why it cannot be used.
+fn profile_of(space: &Space, has_color: bool) -> Result<Profile, String> {
+    match space {
+        Space::Srgb => Ok(Profile::Srgb),
+        Space::Icc(icc) => Profile::parse(icc, has_color),
+        Space::Png(space) => {
+            // Grey has no primaries.
+            let matrix = if has_color { space.matrix } else { IDENTITY };
+            Ok(Profile::Shaper(Box::new(Shaper::of_curve(|x| space.curve.light(x), matrix))))
         }
     }
 }
@@ -50,9 +64,8 @@ fn has_transparency(image: &DynamicImage) -> bool {
 /// The luma (weights of Rec. 709, of stored sRGB values) and the alpha of a picture.
 ///
 /// A profile that cannot be used is left out: it would hardly change the luma.
-pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> GrayAlphaImage {
-    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, image.color().has_color()));
-    let profile = profile.unwrap_or(Profile::Srgb);
+pub(super) fn to_luma_and_alpha(image: DynamicImage, space: &Space) -> GrayAlphaImage {
+    let profile = profile_of(space, image.color().has_color()).unwrap_or(Profile::Srgb);
     let image = image.into_rgba16();
     let mut stencil = Vec::with_capacity(image.width() as usize * image.height() as usize * 2);
     let (mut row, mut scratch) = (Vec::new(), Vec::new());
@@ -63,7 +76,7 @@ pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> Gray
         for &[r, g, b, alpha] in &row {
             let luma = u64::from(r) * 2126 + u64::from(g) * 7152 + u64::from(b) * 722;
             stencil.push(((luma + 10_000 * 257 / 2) / (10_000 * 257)) as u8);
-            stencil.push(((u32::from(alpha) + 128) / 257) as u8);
+            stencil.push(narrowed(alpha));
         }
     }
     GrayAlphaImage::from_raw(image.width(), image.height(), stencil).expect("every row has been converted")
@@ -73,9 +86,9 @@ pub(super) fn to_luma_and_alpha(image: DynamicImage, icc: Option<&[u8]>) -> Gray
 /// its profile, since somebody drew its values.
 ///
 /// A profile that cannot be used is left out: it would hardly change the luma.
-pub(super) fn to_luma_over_black(image: DynamicImage, icc: Option<&[u8]>) -> GrayImage {
-    let icc = icc.filter(|_| image.color().has_color());
-    let profile = icc.map_or(Ok(Profile::Srgb), |icc| Profile::parse(icc, true)).unwrap_or(Profile::Srgb);
+pub(super) fn to_luma_over_black(image: DynamicImage, space: &Space) -> GrayImage {
+    let has_color = image.color().has_color();
+    let profile = if has_color { profile_of(space, true).unwrap_or(Profile::Srgb) } else { Profile::Srgb };
     let image = image.into_rgba16();
     let mut lumas = Vec::with_capacity(image.width() as usize * image.height() as usize);
     let (mut row, mut scratch) = (Vec::new(), Vec::new());
@@ -95,6 +108,11 @@ pub(super) fn to_luma_over_black(image: DynamicImage, icc: Option<&[u8]>) -> Gra
 /// An 8-bit channel in 16 bits: 0 stays 0, 255 becomes 65,535.
 fn widen(channel: u8) -> u16 {
     u16::from(channel) * 257
+}
+
+/// A 16-bit channel in 8 bits, rounded to the nearest.
+fn narrowed(channel: u16) -> u8 {
+    ((u32::from(channel) + 128) / 257) as u8
 }
 
 /// A float channel in 16 bits: [0, 1] becomes [0, 65,535], what lies outside is clipped, NaN is 0.
@@ -126,13 +144,11 @@ impl Conversion {
         RgbImage::from_raw(width_px, height_px, opaque).expect("every row has been converted")
     }
 
-    /// The picture over the background, and its alpha beside that.
+    /// The picture as it is stored, and its alpha beside that. A colour mixed with black would be a dark fringe around
+    /// everything that has soft edges.
     fn with_alpha(&self, image: DynamicImage) -> RgbaImage {
         let (width_px, height_px) = (image.width(), image.height());
-        let beside = |pixel: [u16; 4]| {
-            let [r, g, b] = self.composite(pixel);
-            [r, g, b, ((u32::from(pixel[3]) + 128) / 257) as u8]
-        };
+        let beside = |pixel: [u16; 4]| pixel.map(narrowed);
         let cut = match image {
             DynamicImage::ImageLumaA8(image) => self.convert(&image, widen, beside),
             DynamicImage::ImageRgba8(image) => self.convert(&image, widen, beside),

@@ -1,31 +1,24 @@
 //! From a file's bytes to a [`Photo`]: check limits, decode, convert colours, turn upright and fit to size.
 
 use std::fs::File;
-use std::io::{self, Cursor, Read};
+use std::io::{self, Read};
 use std::path::Path;
 
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, RgbImage, RgbaImage};
+use image::{DynamicImage, ImageFormat, ImageReader, RgbImage, RgbaImage};
 use sha2::{Digest, Sha256};
 
-use super::{Photo, color, jpeg_segments, resize};
+use super::kinds::{Kind, READ, SIGNATURE_BYTES, kind_of};
+use super::raw::{CutShort, Raw, Space, by_image, check_memory, check_size, limits};
+use super::{Photo, color, frames, from_jpeg, from_png, from_tiff, jpeg_segments, resize};
 use crate::error::{Error, Result};
+use crate::memory;
 
-/// Largest side in px of a picture that is read.
-pub const SIDE_MAX_PX: u32 = 65_535;
-/// Most pixels of a picture that is read: 2^28.
-pub const PIXEL_COUNT_MAX: u64 = 1 << 28;
-/// Most bytes that a decoder may allocate: [`PIXEL_COUNT_MAX`] pixels of four floats.
-const DECODE_BYTES_MAX: u64 = PIXEL_COUNT_MAX * 16;
 /// Bytes per pixel while a picture is decoded. A pixel takes up to eight as it is stored; copies of it are in sRGB and
 /// turned upright.
 const BYTES_PER_DECODED_PIXEL: u64 = 16;
 /// Most bytes of a file that is read.
 const FILE_BYTES_MAX: u64 = 1 << 32;
-/// Bytes at the beginning of a file that are enough to recognise its format.
-const SIGNATURE_BYTES: u64 = 64;
-/// The formats that are read, for messages.
-const FORMATS: &str = "PNG, JPEG, WebP, TIFF, BMP and GIF";
 
 /// What lies behind a picture that is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +43,8 @@ pub struct ReadOptions {
     /// Size in px, at least 1, to which the longer side is reduced. Smaller pictures keep their size, and with `None`
     /// all do.
     pub long_side_px: Option<u32>,
+    /// What is done about a file that ends too early.
+    pub cut_short: CutShort,
 }
 
 /// A picture that was read, and facts about its file.
@@ -60,8 +55,8 @@ pub struct Loaded {
     /// Which pixels of `photo` are transparent, row by row: those with an alpha below 128 of 255. `None` if no pixel
     /// is, or if the picture was read over a colour.
     ///
-    /// These pixels are black. The others are composited on black, and no colour of a transparent pixel spills into
-    /// them.
+    /// These pixels are black. The others have their own colours, as if they were opaque, and no colour of a
+    /// transparent pixel spills into them.
     pub transparent: Option<Vec<bool>>,
     /// Width in px of the upright picture before it was fitted.
     pub original_width_px: u32,
@@ -76,15 +71,15 @@ pub struct Loaded {
 /// Reads the picture at `path`. Its content decides the format, not its name.
 ///
 /// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
-/// background (on black if that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The pixels
+/// background (unless that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The pixels
 /// are the same on every machine, except under an ICC profile that has tables and no matrix: there a processor's fused
 /// multiplications may change a channel by one.
 ///
 /// # Errors
-/// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, or exceeds
-/// [`SIDE_MAX_PX`], [`PIXEL_COUNT_MAX`] or 4 GiB.
+/// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, exceeds
+/// [`super::SIDE_MAX_PX`], [`super::PIXEL_COUNT_MAX`] or 4 GiB, or takes more memory to decode than is free.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
-    Decoded::read(path).map(|decoded| decoded.into_fitted(options))
+    Decoded::read(path, options.cut_short).map(|decoded| decoded.into_fitted(options))
 }
 
 /// A picture as it is stored, from which it can be fitted more than once.
@@ -99,9 +94,9 @@ impl Decoded {
     ///
     /// # Errors
     /// As [`read`].
-    pub fn read(path: &Path) -> Result<Self> {
+    pub fn read(path: &Path, cut_short: CutShort) -> Result<Self> {
         let (format, bytes) = read_picture_file(path)?;
-        Self::decode(&bytes, format).map_err(|reason| Error::input(path, reason))
+        Self::decode(&bytes, format, cut_short).map_err(|reason| Error::input(path, reason))
     }
 
     /// Decodes the picture that a file of these bytes would hold.
@@ -112,16 +107,15 @@ impl Decoded {
         if bytes.is_empty() {
             return Err("is empty (0 bytes)".to_owned());
         }
-        let format = known_format(bytes).ok_or_else(|| format!("not a picture that can be read; {FORMATS} can"))?;
-        Self::decode(bytes, format)
+        Self::decode(bytes, known_format(bytes)?, CutShort::Refuse)
     }
 
     /// A picture of 8-bit sRGB pixels, `channels` bytes each (3, or 4 with alpha that is not premultiplied), row by row
     /// from the top. Its SHA-256 is that of the text `smalti CHANNELS WIDTHxHEIGHT`, a line break, and the bytes.
     ///
     /// # Errors
-    /// A sentence, if there are not as many bytes as the size says, or the size is none or exceeds [`SIDE_MAX_PX`] or
-    /// [`PIXEL_COUNT_MAX`].
+    /// A sentence, if there are not as many bytes as the size says, or the size is none or exceeds
+    /// [`super::SIDE_MAX_PX`] or [`super::PIXEL_COUNT_MAX`].
     pub fn from_pixels(width_px: u32, height_px: u32, channels: u8, bytes: &[u8]) -> Result<Self, String> {
         check_size((width_px, height_px))?;
         let expected = u64::from(width_px) * u64::from(height_px) * u64::from(channels);
@@ -137,11 +131,12 @@ impl Decoded {
             RgbImage::from_raw(width_px, height_px, bytes.to_vec()).map(DynamicImage::from)
         };
         let image = image.ok_or_else(|| format!("pixels have 3 or 4 channels, not {channels}"))?;
-        Ok(Self { raw: Raw { image, profile: None, orientation: Orientation::NoTransforms }, sha256 })
+        let raw = Raw { image, space: Space::Srgb, orientation: Orientation::NoTransforms, warnings: Vec::new() };
+        Ok(Self { raw, sha256 })
     }
 
-    fn decode(bytes: &[u8], format: ImageFormat) -> Result<Self, String> {
-        Ok(Self { raw: decode_raw(bytes, format)?, sha256: hex(&Sha256::digest(bytes)) })
+    fn decode(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> Result<Self, String> {
+        Ok(Self { raw: decode_raw(bytes, format, cut_short)?, sha256: hex(&Sha256::digest(bytes)) })
     }
 
     /// Width and height in px of the upright picture.
@@ -161,6 +156,12 @@ impl Decoded {
         &self.sha256
     }
 
+    /// What was ignored or mended so far, one sentence for each thing.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.raw.warnings
+    }
+
     /// The picture as [`read`] gives it.
     #[must_use]
     pub fn fitted(&self, options: &ReadOptions) -> Loaded {
@@ -171,8 +172,8 @@ impl Decoded {
     #[must_use]
     pub fn into_fitted(self, options: &ReadOptions) -> Loaded {
         let Self { raw, sha256 } = self;
-        let mut warnings = Vec::new();
-        let mut upright = color::to_srgb(raw.image, raw.profile.as_deref(), options.background, &mut warnings);
+        let mut warnings = raw.warnings;
+        let mut upright = color::to_srgb(raw.image, &raw.space, options.background, &mut warnings);
         upright.apply_orientation(raw.orientation);
         let (original_width_px, original_height_px) = (upright.width(), upright.height());
         let (photo, transparent) = match upright {
@@ -190,7 +191,6 @@ pub fn decoding_bytes(path: &Path) -> u64 {
     let size = || {
         let mut reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
         reader.limits(limits());
-        reader.format().filter(|&format| is_read(format))?;
         reader.into_dimensions().ok()
     };
     size()
@@ -201,16 +201,30 @@ pub fn decoding_bytes(path: &Path) -> u64 {
 /// The last chunk of every PNG, with its checksum.
 const PNG_END: [u8; 12] = [0, 0, 0, 0, b'I', b'E', b'N', b'D', 0xAE, 0x42, 0x60, 0x82];
 
-/// Whether the file at `path` begins like a picture that can be read.
+/// What the file at `path` is, told by its content.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read.
+pub fn kind_of_file(path: &Path) -> Result<Kind> {
+    let mut beginning = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(DIRECTORY_BYTES).read_to_end(&mut beginning));
+    read.map_err(|error| Error::input(path, why_unreadable(&error)))?;
+    Ok(kind_of(&beginning))
+}
+
+/// Bytes of a file that show its kind, which of camera raw lies in directories somewhere in it.
+const DIRECTORY_BYTES: u64 = 1 << 20;
+
+/// Whether the file at `path` begins like a picture that can be read.
+///
+/// # Errors
+/// [`Error::Input`] if the file cannot be read, or holds a picture in a format that is not read.
 pub(super) fn is_picture(path: &Path) -> Result<bool> {
-    let mut signature = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(SIGNATURE_BYTES).read_to_end(&mut signature))
-        .map_err(|error| Error::input(path, why_unreadable(&error)))?;
-    Ok(known_format(&signature).is_some())
+    match kind_of_file(path)? {
+        Kind::Read(_) => Ok(true),
+        Kind::Foreign(foreign) => Err(Error::input(path, foreign.reason())),
+        Kind::Other => Ok(false),
+    }
 }
 
 /// Whether the file at `path` is a whole PNG, JPEG or WebP: its pixels can be decoded, and nothing is missing after
@@ -227,7 +241,7 @@ pub fn is_whole(path: &Path) -> bool {
         }
         _ => false,
     };
-    has_its_end && decode_raw(&bytes, format).is_ok()
+    has_its_end && decode_raw(&bytes, format, CutShort::Refuse).is_ok()
 }
 
 /// The format and the bytes of the file at `path`, if its first bytes show that it is a picture.
@@ -236,17 +250,20 @@ pub(super) fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
     let mut file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
     // Only the beginning: `/dev/zero` has no end.
-    file.by_ref().take(SIGNATURE_BYTES).read_to_end(&mut bytes).map_err(unreadable)?;
+    file.by_ref().take(SIGNATURE_BYTES as u64).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.is_empty() {
         return Err(Error::input(path, "the file is empty (0 bytes); get it again"));
     }
-    let format = known_format(&bytes)
-        .ok_or_else(|| Error::input(path, format!("not a picture that can be read; {FORMATS} can")))?;
+    let refused = |reason: String| Error::input(path, reason);
+    known_format(&bytes).map_err(refused)?;
+    let file_bytes = file.metadata().map_or(0, |found| found.len());
+    check_memory(file_bytes, memory::free_bytes(), "to read the file").map_err(refused)?;
     file.take(FILE_BYTES_MAX).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > FILE_BYTES_MAX {
         return Err(Error::input(path, "the file is larger than the limit of 4 GiB; save a smaller version"));
     }
-    Ok((format, bytes))
+    // Only now: where the directories of camera raw lie, the beginning does not tell.
+    Ok((known_format(&bytes).map_err(refused)?, bytes))
 }
 
 /// Why opening or reading an input failed, and what to do.
@@ -259,75 +276,28 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
     }
 }
 
-/// The format that the first bytes of a file show, if it is one that is read.
-pub(super) fn known_format(bytes: &[u8]) -> Option<ImageFormat> {
-    image::guess_format(bytes).ok().filter(|&format| is_read(format))
-}
-
-fn is_read(format: ImageFormat) -> bool {
-    use ImageFormat::{Bmp, Gif, Jpeg, Png, Tiff, WebP};
-    matches!(format, Png | Jpeg | WebP | Tiff | Bmp | Gif)
-}
-
-/// The output of a decoder, and what is still to be applied to it.
-#[derive(Clone)]
-pub(super) struct Raw {
-    pub(super) image: DynamicImage,
-    pub(super) profile: Option<Vec<u8>>,
-    pub(super) orientation: Orientation,
-}
-
 /// The picture in `bytes` as it is stored, within the limits, or a sentence that says why there is none.
-pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat) -> Result<Raw, String> {
-    let broken = |error: ImageError| why_undecodable(format, error);
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    reader.limits(limits());
-    let mut decoder = reader.into_decoder().map_err(broken)?;
-    check_size(decoder.dimensions())?;
-    // The JPEG decoder fills what is missing with grey and reports success.
-    if format == ImageFormat::Jpeg && !jpeg_segments::is_complete(bytes) {
-        return Err(broken_sentence(format, "its end is missing"));
+pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> Result<Raw, String> {
+    let mut raw = match format {
+        ImageFormat::Jpeg => from_jpeg::decode(bytes, cut_short),
+        ImageFormat::Png => from_png::decode(bytes, cut_short),
+        ImageFormat::Tiff => from_tiff::decode(bytes, cut_short),
+        _ => by_image(bytes, format, cut_short, 0),
+    }?;
+    let (count, plural) = frames::count(bytes, format);
+    if count > 1 {
+        raw.warnings.push(format!("the first of {count} {plural} is read"));
     }
-    let orientation = decoder.orientation().map_err(broken)?;
-    let profile = decoder.icc_profile().map_err(broken)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(broken)?;
-    Ok(Raw { image, profile, orientation })
+    Ok(raw)
 }
 
-/// Limits that make a decoder refuse a picture before it allocates too much memory.
-fn limits() -> Limits {
-    let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(DECODE_BYTES_MAX);
-    limits
-}
-
-fn check_size((width_px, height_px): (u32, u32)) -> Result<(), String> {
-    if width_px == 0 || height_px == 0 {
-        return Err(format!("the picture has no pixels ({width_px}x{height_px}); save it again"));
+/// The format that the bytes of a file show, or a sentence if it is none that is read.
+fn known_format(bytes: &[u8]) -> Result<ImageFormat, String> {
+    match kind_of(bytes) {
+        Kind::Read(format) => Ok(format),
+        Kind::Foreign(foreign) => Err(foreign.reason()),
+        Kind::Other => Err(format!("not a picture that can be read; {READ} can")),
     }
-    if width_px.max(height_px) > SIDE_MAX_PX || u64::from(width_px) * u64::from(height_px) > PIXEL_COUNT_MAX {
-        return Err(format!(
-            "the picture has {width_px}x{height_px} px, more than the {SIDE_MAX_PX} px a side or {PIXEL_COUNT_MAX} px \
-             in all that are read; save a smaller version"
-        ));
-    }
-    Ok(())
-}
-
-fn why_undecodable(format: ImageFormat, error: ImageError) -> String {
-    match error {
-        ImageError::Limits(_) => {
-            "the picture needs more memory to decode than the limit of 4 GiB; save a smaller version".to_owned()
-        }
-        ImageError::Unsupported(error) => {
-            format!("this kind of {format:?} is not supported ({error}); convert the picture to an 8-bit RGB PNG")
-        }
-        error => broken_sentence(format, &error.to_string()),
-    }
-}
-
-fn broken_sentence(format: ImageFormat, detail: &str) -> String {
-    format!("the {format:?} data is broken or cut short ({detail}); get the file or save it again")
 }
 
 fn hex(bytes: &[u8]) -> String {

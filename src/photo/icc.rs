@@ -2,20 +2,23 @@
 //!
 //! Cameras, editors and phones embed curves and a matrix. These are evaluated here, in double precision and with the
 //! powers of `libm`, because `moxcms` fuses multiplications where the processor can and so rounds differently on
-//! different machines. `moxcms` still parses every profile, and evaluates the rare ones that have only tables, such as
-//! those of scanners.
+//! different machines. `moxcms` still parses every profile, and evaluates those that have only tables: of inks, and of
+//! some scanners.
 
 use std::sync::Arc;
 
 use moxcms::{ColorProfile, DataColorSpace, Layout, ToneReprCurve, Transform16BitExecutor, TransformOptions};
 
+/// From three channels to three.
+pub(super) type Matrix = [[f64; 3]; 3];
+
 /// Linear sRGB from XYZ under D50, the white of profiles (B. Lindbloom, Bradford-adapted).
-const SRGB_FROM_XYZ: [[f64; 3]; 3] = [
+pub(super) const SRGB_FROM_XYZ: Matrix = [
     [3.133_856_1, -1.616_866_7, -0.490_614_6],
     [-0.978_768_4, 1.916_141_5, 0.033_454_0],
     [0.071_945_3, -0.228_991_4, 1.405_242_7],
 ];
-const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+pub(super) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// Profiles round the primaries of sRGB in different ways. A profile this close to sRGB counts as sRGB, so that the
 /// most common profile of all changes no pixel.
 const SRGB_TOLERANCE: f64 = 1e-3;
@@ -30,6 +33,22 @@ pub(super) enum Profile {
     Shaper(Box<Shaper>),
     /// By tables, which `moxcms` evaluates.
     Tables(Arc<Transform16BitExecutor>),
+}
+
+/// Whether a profile is for cyan, magenta, yellow and black.
+pub(super) fn is_of_inks(icc: &[u8]) -> bool {
+    ColorProfile::new_from_slice(icc).is_ok_and(|profile| profile.color_space == DataColorSpace::Cmyk)
+}
+
+/// The sRGB samples of inks, four bytes a pixel, by the tables of their profile.
+pub(super) fn srgb_of_inks(icc: &[u8], inks: &[u8]) -> Result<Vec<u8>, String> {
+    let unusable = |error: moxcms::CmsError| format!("it cannot be used ({error}); save the picture as sRGB");
+    let profile = ColorProfile::new_from_slice(icc).map_err(unusable)?;
+    let (srgb, options) = (ColorProfile::new_srgb(), TransformOptions::default());
+    let transform = profile.create_transform_8bit(Layout::Rgba, &srgb, Layout::Rgb, options).map_err(unusable)?;
+    let mut samples = vec![0; inks.len() / 4 * 3];
+    transform.transform(inks, &mut samples).map_err(unusable)?;
+    Ok(samples)
 }
 
 impl Profile {
@@ -72,7 +91,7 @@ pub(super) struct Shaper {
     /// For each channel, the linear light in [0, 1] of every 16-bit value.
     linear: [Vec<f64>; 3],
     /// Linear sRGB from the profile's linear channels.
-    matrix: [[f64; 3]; 3],
+    matrix: Matrix,
     /// 16-bit sRGB of linear light, at every 1/65,535.
     encoded: Vec<f64>,
 }
@@ -91,8 +110,13 @@ impl Shaper {
             return None;
         };
         let [red, green, blue] = curves.map(linear_values);
-        let encoded = (0..=STEPS).map(|step| STEPS as f64 * srgb_encoded(step as f64 / STEPS as f64)).collect();
-        Some(Self { linear: [red?, green?, blue?], matrix, encoded })
+        Some(Self { linear: [red?, green?, blue?], matrix, encoded: encoded_values() })
+    }
+
+    /// Of one curve for all channels, which gives the light in [0, 1] of a value in [0, 1], and linear sRGB from that.
+    pub(super) fn of_curve(light: impl Fn(f64) -> f64, matrix: Matrix) -> Self {
+        let linear: Vec<f64> = (0..=STEPS).map(|step| light(step as f64 / STEPS as f64).clamp(0.0, 1.0)).collect();
+        Self { linear: [linear.clone(), linear.clone(), linear], matrix, encoded: encoded_values() }
     }
 
     fn apply(&self, pixel: &mut [u16; 4]) {
@@ -112,11 +136,21 @@ impl Shaper {
 }
 
 /// Linear sRGB from the linear channels of an RGB profile.
-fn srgb_from_channels(profile: &ColorProfile) -> [[f64; 3]; 3] {
+fn srgb_from_channels(profile: &ColorProfile) -> Matrix {
     let columns = [profile.red_colorant, profile.green_colorant, profile.blue_colorant];
     let matrix = SRGB_FROM_XYZ.map(|row| columns.map(|xyz| row[0] * xyz.x + row[1] * xyz.y + row[2] * xyz.z));
+    if is_nearly_identity(&matrix) { IDENTITY } else { matrix }
+}
+
+/// Whether a matrix is that of sRGB but for rounding.
+pub(super) fn is_nearly_identity(matrix: &Matrix) -> bool {
     let off = matrix.as_flattened().iter().zip(IDENTITY.as_flattened()).map(|(value, unit)| (value - unit).abs());
-    if off.fold(0.0, f64::max) < SRGB_TOLERANCE { IDENTITY } else { matrix }
+    off.fold(0.0, f64::max) < SRGB_TOLERANCE
+}
+
+/// 16-bit sRGB of linear light at every step.
+fn encoded_values() -> Vec<f64> {
+    (0..=STEPS).map(|step| STEPS as f64 * srgb_encoded(step as f64 / STEPS as f64)).collect()
 }
 
 /// Linear light of every 16-bit channel value under a curve (ICC.1:2022, 10.6 and 10.18).

@@ -5,28 +5,39 @@
 //! fly and no target.
 
 mod animation;
+mod camera_raw;
 mod color;
 mod decode;
 mod encode;
+mod frames;
+mod from_jpeg;
+mod from_png;
+mod from_tiff;
 mod icc;
 mod jpeg_segments;
+mod kinds;
 mod metadata;
+mod moving;
 mod palette;
+mod png_space;
+mod raw;
 mod resize;
 mod stencil;
+mod tiff_directories;
 mod webp;
 mod weights;
 pub(crate) mod xml;
 
 pub use animation::{ApngEncoder, Frames, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
 pub(crate) use decode::why_unreadable;
-pub use decode::{
-    Background, Decoded, Loaded, PIXEL_COUNT_MAX, ReadOptions, SIDE_MAX_PX, decoding_bytes, is_whole, read,
-};
+pub use decode::{Background, Decoded, Loaded, ReadOptions, decoding_bytes, is_whole, kind_of_file, read};
 pub use encode::{Format, encode, encode_jpeg, encode_png, encode_png_with_alpha, encode_webp, encode_with_alpha};
+pub use kinds::{Foreign, Kind, kind_of};
 pub(crate) use metadata::png_metadata;
 pub use metadata::{Metadata, read_jpeg_metadata, read_metadata, read_png_metadata};
+pub use moving::{MovingFrame, frame_count, take_apart};
 pub use palette::{COLOR_COUNT_MAX, palette_of, read_palette, reduce};
+pub use raw::{CutShort, PIXEL_COUNT_MAX, SIDE_MAX_PX};
 pub use resize::fitted;
 pub use stencil::{Stencil, decode_stencil, is_picture};
 pub use webp::WEBP_SIDE_MAX_PX;

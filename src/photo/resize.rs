@@ -38,8 +38,8 @@ fn fit_pixels(source: &[[u8; 3]], size_px: (u32, u32), long_side_px: Option<u32>
     Photo { width_px, height_px, pixels: resized(source, size_px, (width_px, height_px), Channels) }
 }
 
-/// The picture over black, with its longer side reduced to `long_side_px`, and which of its pixels are transparent, if
-/// any are. The colours of `image` are already over black.
+/// The picture with its longer side reduced to `long_side_px`, and which of its pixels are transparent, if any are.
+/// Transparent pixels become black, and all others opaque in their own colour.
 ///
 /// Each pixel is weighted by its opacity, so transparent pixels give their neighbours no colour, not even black.
 pub(super) fn fit_cut(image: &RgbaImage, long_side_px: Option<u32>) -> (Photo, Option<Vec<bool>>) {

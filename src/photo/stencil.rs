@@ -3,7 +3,9 @@
 use image::DynamicImage;
 
 use super::color;
-use super::decode::{decode_raw, known_format};
+use super::decode::decode_raw;
+use super::kinds::{Kind, kind_of};
+use super::raw::CutShort;
 
 /// A picture in memory: luma and alpha.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,7 +22,7 @@ pub struct Stencil {
 /// Whether these bytes begin like a picture of a format that is read.
 #[must_use]
 pub fn is_picture(bytes: &[u8]) -> bool {
-    known_format(bytes).is_some()
+    matches!(kind_of(bytes), Kind::Read(_))
 }
 
 /// The upright picture in the bytes of a file, of an animation the first frame.
@@ -29,9 +31,13 @@ pub fn is_picture(bytes: &[u8]) -> bool {
 /// A sentence for the user, without the file's name, if the bytes are not one of the formats, are broken or cut short,
 /// or exceed [`super::SIDE_MAX_PX`] or [`super::PIXEL_COUNT_MAX`].
 pub fn decode_stencil(bytes: &[u8]) -> Result<Stencil, String> {
-    let format = known_format(bytes).ok_or("not a picture that can be read; convert it to PNG")?;
-    let raw = decode_raw(bytes, format)?;
-    let mut image = DynamicImage::ImageLumaA8(color::to_luma_and_alpha(raw.image, raw.profile.as_deref()));
+    let format = match kind_of(bytes) {
+        Kind::Read(format) => format,
+        Kind::Foreign(foreign) => return Err(foreign.reason()),
+        Kind::Other => return Err("not a picture that can be read; convert it to PNG".to_owned()),
+    };
+    let raw = decode_raw(bytes, format, CutShort::Refuse)?;
+    let mut image = DynamicImage::ImageLumaA8(color::to_luma_and_alpha(raw.image, &raw.space));
     image.apply_orientation(raw.orientation);
     let (width_px, height_px) = (image.width(), image.height());
     let (pixels, _) = image.as_bytes().as_chunks::<2>();

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageFormat};
 
-use super::decode::{decode_raw, known_format, read_picture_file};
+use super::decode::{decode_raw, read_picture_file};
+use super::kinds::{Kind, kind_of};
+use super::raw::CutShort;
 use super::{color, resize};
 use crate::error::{Error, Result};
 
@@ -17,9 +19,9 @@ use crate::error::{Error, Result};
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, as for [`super::read`], or if its proportions differ from those of the
 /// picture by more than a pixel at the smaller of the two sizes.
-pub fn read_weights(path: &Path, width_px: u32, height_px: u32) -> Result<Vec<u8>> {
+pub fn read_weights(path: &Path, size_px: (u32, u32), cut_short: CutShort) -> Result<Vec<u8>> {
     let (format, bytes) = read_picture_file(path)?;
-    weights(&bytes, format, (width_px, height_px)).map_err(|reason| Error::input(path, reason))
+    weights(&bytes, format, size_px, cut_short).map_err(|reason| Error::input(path, reason))
 }
 
 /// As [`read_weights`], of the map that a file of these bytes would hold.
@@ -27,13 +29,17 @@ pub fn read_weights(path: &Path, width_px: u32, height_px: u32) -> Result<Vec<u8
 /// # Errors
 /// A sentence without the map's name.
 pub fn decode_weights(bytes: &[u8], width_px: u32, height_px: u32) -> Result<Vec<u8>, String> {
-    let format = known_format(bytes).ok_or_else(|| "not a picture that can be read".to_owned())?;
-    weights(bytes, format, (width_px, height_px))
+    let format = match kind_of(bytes) {
+        Kind::Read(format) => format,
+        Kind::Foreign(foreign) => return Err(foreign.reason()),
+        Kind::Other => return Err("not a picture that can be read".to_owned()),
+    };
+    weights(bytes, format, (width_px, height_px), CutShort::Refuse)
 }
 
-fn weights(bytes: &[u8], format: ImageFormat, size_px: (u32, u32)) -> Result<Vec<u8>, String> {
-    let raw = decode_raw(bytes, format)?;
-    let mut map = DynamicImage::ImageLuma8(color::to_luma_over_black(raw.image, raw.profile.as_deref()));
+fn weights(bytes: &[u8], format: ImageFormat, size_px: (u32, u32), cut_short: CutShort) -> Result<Vec<u8>, String> {
+    let raw = decode_raw(bytes, format, cut_short)?;
+    let mut map = DynamicImage::ImageLuma8(color::to_luma_over_black(raw.image, &raw.space));
     map.apply_orientation(raw.orientation);
     let map = map.into_luma8();
     if !has_proportions_of(map.dimensions(), size_px) {

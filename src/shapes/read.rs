@@ -54,6 +54,8 @@ fn ink_in(bytes: &[u8], looks_like_svg: bool) -> Result<Vec<Ink>, String> {
         Err("is compressed; unpack it with gunzip and name the SVG".to_owned())
     } else if looks_like_svg || svg::is_svg(bytes) {
         svg::rasterised(bytes)
+    } else if let photo::Kind::Foreign(foreign) = photo::kind_of(bytes) {
+        Err(foreign.reason())
     } else {
         Err("not a mask that can be read; PNG, JPEG, WebP, TIFF, BMP, GIF and SVG can".to_owned())
     }?;

@@ -101,4 +101,6 @@ pub(crate) struct Choices {
     pub grout: Option<GroutColor>,
     pub on_dry: Option<OnDry>,
     pub no_rotation: bool,
+    /// Whether pictures that are cut short are taken as far as they go.
+    pub lenient: bool,
 }

@@ -9,7 +9,7 @@ use super::settings::Settings;
 use crate::error::{Error, Result};
 use crate::model::target::weight_of_luma;
 use crate::model::{Rgb, Target};
-use crate::photo::{self, Background, Loaded, Photo, ReadOptions};
+use crate::photo::{self, Background, CutShort, Loaded, Photo, ReadOptions};
 
 /// Where the pixels of a job come from.
 pub(super) enum Source<'a> {
@@ -39,7 +39,8 @@ impl Fitted {
     pub fn new(source: &Source<'_>, settings: &Settings, background: Rgb) -> Result<Self> {
         let background =
             if settings.keeps_transparency() { Background::Transparent } else { Background::Color(background) };
-        let reading = ReadOptions { background, long_side_px: Some(settings.long_side_px) };
+        let cut_short = settings.cut_short;
+        let reading = ReadOptions { background, long_side_px: Some(settings.long_side_px), cut_short };
         let loaded = match source {
             Source::File(path) => photo::read(path, &reading)?,
             Source::Picture(picture) => picture.fitted(&reading),
@@ -64,7 +65,7 @@ impl Fitted {
             target = target.with_transparent(transparent)?;
         }
         if let Some(weight) = &settings.weight {
-            let lumas = lumas(weight, width_px, height_px)?;
+            let lumas = lumas(weight, (width_px, height_px), cut_short)?;
             target = target.with_weights(lumas.into_iter().map(weight_of_luma).collect())?;
         }
         let original_size_px = (original_width_px, original_height_px);
@@ -73,9 +74,9 @@ impl Fitted {
 }
 
 /// How much each pixel of the fitted picture matters, 0 to 255.
-fn lumas(weight: &WeightSource, width_px: u32, height_px: u32) -> Result<Vec<u8>> {
+fn lumas(weight: &WeightSource, (width_px, height_px): (u32, u32), cut_short: CutShort) -> Result<Vec<u8>> {
     match weight {
-        WeightSource::File(path) => photo::read_weights(path, width_px, height_px),
+        WeightSource::File(path) => photo::read_weights(path, (width_px, height_px), cut_short),
         WeightSource::Encoded(bytes) => {
             photo::decode_weights(bytes, width_px, height_px).map_err(|reason| contradiction("weight", reason))
         }

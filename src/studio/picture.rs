@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::parameters::contradiction;
 use crate::error::Result;
-use crate::photo::Decoded;
+use crate::photo::{CutShort, Decoded};
 
 /// A picture: upright, of any size, with or without transparency. It may serve many recipes.
 ///
@@ -41,13 +41,23 @@ impl Picture {
         decoded.map(|decoded| Self { decoded }).map_err(|reason| contradiction("picture", reason))
     }
 
-    /// Reads a PNG, JPEG, WebP, TIFF, BMP or GIF file (its first frame): EXIF orientation is applied, an ICC profile
+    /// Reads a PNG, JPEG, WebP, TIFF, BMP or GIF file (its first frame): EXIF orientation is applied, colours are
     /// converted to sRGB.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] if the file cannot be read, is no such picture, is broken or cut short, or is too large.
+    /// [`crate::Error::Input`] if the file cannot be read, is no such picture, is broken or cut short, is too large, or
+    /// takes more memory to decode than is free.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
-        Decoded::read(path.as_ref()).map(|decoded| Self { decoded })
+        Decoded::read(path.as_ref(), CutShort::Refuse).map(|decoded| Self { decoded })
+    }
+
+    /// As [`Picture::open`], and takes of a file that is cut short what is there; the rest is grey, black or
+    /// transparent. [`Picture::warnings`] tells.
+    ///
+    /// # Errors
+    /// As [`Picture::open`], if nothing can be taken.
+    pub fn open_lenient(path: impl AsRef<Path>) -> Result<Self> {
+        Decoded::read(path.as_ref(), CutShort::Take).map(|decoded| Self { decoded })
     }
 
     /// As [`Picture::open`], from the bytes of the file.
@@ -69,6 +79,12 @@ impl Picture {
     #[must_use]
     pub fn sha256(&self) -> &str {
         self.decoded.sha256()
+    }
+
+    /// What was ignored or mended while the picture was decoded, one sentence for each thing.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        self.decoded.warnings()
     }
 
     pub(super) fn decoded(&self) -> &Decoded {

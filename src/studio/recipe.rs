@@ -340,6 +340,14 @@ impl Recipe {
         self
     }
 
+    /// Takes of files that are cut short what is there: of the map of weights, and of the picture where the recipe
+    /// reads it. A picture in memory is opened before ([`super::Picture::open_lenient`]).
+    #[must_use]
+    pub fn lenient(mut self) -> Self {
+        self.choices.lenient = true;
+        self
+    }
+
     /// Calls `set` with a value, if there is one.
     #[must_use]
     pub fn set<T>(self, value: Option<T>, set: impl FnOnce(Self, T) -> Self) -> Self {

@@ -12,6 +12,7 @@ use super::recipe::Recipe;
 use crate::error::Result;
 use crate::evolve::PaperScheme;
 use crate::model::{Blend, Rgb};
+use crate::photo::CutShort;
 
 /// Longer side in px that pictures are reduced to.
 const LONG_SIDE_PX: u64 = 512;
@@ -63,6 +64,8 @@ pub(crate) struct Settings {
     pub background: Option<Rgb>,
     pub weight: Option<WeightSource>,
     pub init: Option<InitSource>,
+    /// What is done about pictures that end too early.
+    pub cut_short: CutShort,
     /// Whoever drives the work ends it after this time. It is in the key, since it decides the result.
     pub time_limit: Option<Duration>,
 }
@@ -114,6 +117,7 @@ impl Settings {
             background: choices.background,
             weight: choices.weight.clone(),
             init: choices.init.clone(),
+            cut_short: if choices.lenient { CutShort::Take } else { CutShort::Refuse },
             time_limit: None,
         })
     }

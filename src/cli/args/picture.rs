@@ -43,6 +43,9 @@ pub(crate) struct PictureArgs {
     /// where the map is white as where it is black [default: alike everywhere]
     #[arg(long, value_name = "MAP", help_heading = "Picture")]
     pub weight: Option<PathBuf>,
+    /// Take of a picture that is cut short what is there, with a warning
+    #[arg(long, help_heading = "Picture")]
+    pub lenient: bool,
     /// Population to begin with, a .npz file of the same picture size; it also gives the number of tiles
     #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]
     pub init: Option<PathBuf>,
@@ -169,6 +172,9 @@ impl PictureArgs {
             .set(paper.tile_scale, Recipe::tile_scale);
         if paper.no_rotation {
             recipe = recipe.no_rotation();
+        }
+        if self.lenient {
+            recipe = recipe.lenient();
         }
         recipe.choices.style = style.or(recipe.choices.style);
         recipe.choices.colors = self.colors.clone().or(recipe.choices.colors);

@@ -8,13 +8,14 @@ use std::path::{Path, PathBuf};
 use glob::{MatchOptions, Pattern};
 
 use super::destination::place_of;
+use super::left_out::LeftOut;
 use crate::error::{Error, Result};
 use crate::photo;
 
 /// The characters that make a name a pattern.
 const WILD: [char; 3] = ['*', '?', '['];
 /// Endings that mark the pictures of a folder, in lower case.
-const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif"];
+const ENDINGS: [&str; 12] = ["png", "apng", "jpg", "jpeg", "jpe", "jfif", "webp", "tif", "tiff", "bmp", "dib", "gif"];
 
 /// A file that was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,25 +38,26 @@ pub(crate) enum Depth {
 /// for pictures.
 ///
 /// A name that neither exists nor is a pattern becomes a picture that will fail, and so does whatever cannot be read
-/// below a folder: neither may stop the other pictures.
+/// below a folder: neither may stop the other pictures. The other files of folders are counted in `left_out`.
 ///
 /// # Errors
 /// [`Error::Input`] if a folder that is named cannot be read; [`Error::Usage`] if a pattern is wrong.
-pub(crate) fn find(named: &[PathBuf], depth: Depth, outputs: &Path) -> Result<Vec<Found>> {
+pub(crate) fn find(named: &[PathBuf], depth: Depth, outputs: &Path, left_out: &mut LeftOut) -> Result<Vec<Found>> {
     let outputs = place_of(outputs);
-    let mut found = Vec::new();
+    let mut listing = Listing { found: Vec::new(), left_out, depth, outputs: &outputs };
     for path in named {
         let text = path.to_string_lossy();
         if path.is_dir() {
             let unreadable = |error| Error::input(path, photo::why_unreadable(&error));
-            list(path, Path::new(""), depth, &outputs, &mut found).map_err(unreadable)?;
+            listing.list(path, Path::new("")).map_err(unreadable)?;
         } else if is_pattern(path) {
-            found.extend(matches(&text, &outputs)?);
+            listing.found.extend(matches(&text, &outputs)?);
         } else {
             let relative = path.file_name().map_or_else(|| path.clone(), PathBuf::from);
-            found.push(Found { path: path.clone(), relative });
+            listing.found.push(Found { path: path.clone(), relative });
         }
     }
+    let mut found = listing.found;
     let mut seen = HashSet::new();
     found.retain(|one: &Found| seen.insert(one.path.clone()));
     Ok(found)
@@ -65,41 +67,61 @@ pub(crate) fn find(named: &[PathBuf], depth: Depth, outputs: &Path) -> Result<Ve
 ///
 /// # Errors
 /// [`Error::Input`] if it cannot be read, or holds none.
-pub(crate) fn in_folder(folder: &Path) -> Result<Vec<PathBuf>> {
-    let mut found = Vec::new();
-    list(folder, Path::new(""), Depth::Flat, Path::new(""), &mut found)
-        .map_err(|error| Error::input(folder, photo::why_unreadable(&error)))?;
-    if found.is_empty() {
-        return Err(Error::input(folder, "holds no pictures; name another folder"));
+pub(crate) fn in_folder(folder: &Path, left_out: &mut LeftOut) -> Result<Vec<PathBuf>> {
+    let mut listing = Listing { found: Vec::new(), left_out, depth: Depth::Flat, outputs: Path::new("") };
+    listing.list(folder, Path::new("")).map_err(|error| Error::input(folder, photo::why_unreadable(&error)))?;
+    if listing.found.is_empty() {
+        let reason = listing.left_out.told().map_or_else(
+            || "holds no pictures; name another folder".to_owned(),
+            |told| format!("holds no picture that is read, but {told}"),
+        );
+        return Err(Error::input(folder, reason));
     }
-    Ok(found.into_iter().map(|one| one.path).collect())
+    Ok(listing.found.into_iter().map(|one| one.path).collect())
 }
 
-/// The pictures in `folder` and, with [`Depth::Recursive`], in the folders below it: first its own, then folder by
-/// folder. A folder that is named like a picture counts as a picture, so that it fails and is reported. Links to
-/// folders are not followed, since they may lead in a circle.
-fn list(folder: &Path, relative: &Path, depth: Depth, outputs: &Path, found: &mut Vec<Found>) -> std::io::Result<()> {
-    let mut names = Vec::new();
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        names.push((entry.file_name(), entry.file_type()?.is_dir()));
-    }
-    names.retain(|(name, _)| !name.as_encoded_bytes().starts_with(b"."));
-    names.sort_by(|(one, _), (other, _)| compare(one, other));
-    let (folders, files): (Vec<_>, Vec<_>) =
-        names.into_iter().partition(|(name, is_folder)| *is_folder && !is_named_like_a_picture(Path::new(name)));
-    let files = files.into_iter().filter(|(name, _)| is_named_like_a_picture(Path::new(name)));
-    found.extend(files.map(|(name, _)| Found { path: folder.join(&name), relative: relative.join(&name) }));
-    if depth == Depth::Flat {
-        return Ok(());
-    }
-    for (name, _) in folders {
-        let (path, relative) = (folder.join(&name), relative.join(&name));
-        if place_of(&path) != outputs && list(&path, &relative, depth, outputs, found).is_err() {
-            found.push(Found { path, relative });
+/// What folders hold.
+struct Listing<'a> {
+    found: Vec<Found>,
+    left_out: &'a mut LeftOut,
+    depth: Depth,
+    /// The folder of outputs.
+    outputs: &'a Path,
+}
+
+impl Listing<'_> {
+    /// Adds the pictures in `folder` and, with [`Depth::Recursive`], in the folders below it: first its own, then
+    /// folder by folder. A folder that is named like a picture counts as a picture, so that it fails and is reported.
+    /// Links to folders are not followed, since they may lead in a circle.
+    fn list(&mut self, folder: &Path, relative: &Path) -> std::io::Result<()> {
+        let mut names = Vec::new();
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            names.push((entry.file_name(), entry.file_type()?.is_dir()));
         }
+        names.retain(|(name, _)| !name.as_encoded_bytes().starts_with(b"."));
+        names.sort_by(|(one, _), (other, _)| compare(one, other));
+        let (folders, files): (Vec<_>, Vec<_>) =
+            names.into_iter().partition(|(name, is_folder)| *is_folder && !is_named_like_a_picture(Path::new(name)));
+        for (name, _) in files {
+            let path = folder.join(&name);
+            if is_named_like_a_picture(&path) {
+                self.found.push(Found { path, relative: relative.join(&name) });
+            } else if !path.is_dir() {
+                self.left_out.note(&path);
+            }
+        }
+        if self.depth == Depth::Flat {
+            return Ok(());
+        }
+        for (name, _) in folders {
+            let (path, relative) = (folder.join(&name), relative.join(&name));
+            if place_of(&path) != self.outputs && self.list(&path, &relative).is_err() {
+                self.found.push(Found { path, relative });
+            }
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// The named folders and patterns. They tell which of them would find an output and take it for a picture the next
@@ -247,9 +269,9 @@ mod tests {
         let folder = folder();
         let named = [folder.path().to_owned()];
         let elsewhere = Path::new("elsewhere");
-        assert_eq!(relative(find(&named, Depth::Flat, elsewhere)), ["a.jpg", "odd.png"]);
+        assert_eq!(relative(find(&named, Depth::Flat, elsewhere, &mut LeftOut::default())), ["a.jpg", "odd.png"]);
         let all = ["a.jpg", "odd.png", "b/p2.PNG", "b/p10.png", "c/deep/x.webp"];
-        assert_eq!(relative(find(&named, Depth::Recursive, elsewhere)), all);
+        assert_eq!(relative(find(&named, Depth::Recursive, elsewhere, &mut LeftOut::default())), all);
     }
 
     #[test]
@@ -257,11 +279,20 @@ mod tests {
         let folder = folder();
         let at = |name: &str| folder.path().join(name);
         let named = [folder.path().to_owned()];
-        assert_eq!(relative(find(&named, Depth::Recursive, &at("b/../b"))), ["a.jpg", "odd.png", "c/deep/x.webp"]);
-        assert_eq!(relative(find(&named, Depth::Recursive, &at("c"))), ["a.jpg", "odd.png", "b/p2.PNG", "b/p10.png"]);
-        assert_eq!(relative(find(&[at("**/p*")], Depth::Flat, &at("c"))), ["b/p2.PNG", "b/p10.png"]);
-        assert!(find(&[at("**/p*")], Depth::Flat, &at("b")).is_err(), "nothing is left");
-        assert_eq!(relative(find(&[at("b/*")], Depth::Flat, &at("b"))), ["p2.PNG", "p10.png"]);
+        assert_eq!(
+            relative(find(&named, Depth::Recursive, &at("b/../b"), &mut LeftOut::default())),
+            ["a.jpg", "odd.png", "c/deep/x.webp"]
+        );
+        assert_eq!(
+            relative(find(&named, Depth::Recursive, &at("c"), &mut LeftOut::default())),
+            ["a.jpg", "odd.png", "b/p2.PNG", "b/p10.png"]
+        );
+        assert_eq!(
+            relative(find(&[at("**/p*")], Depth::Flat, &at("c"), &mut LeftOut::default())),
+            ["b/p2.PNG", "b/p10.png"]
+        );
+        assert!(find(&[at("**/p*")], Depth::Flat, &at("b"), &mut LeftOut::default()).is_err(), "nothing is left");
+        assert_eq!(relative(find(&[at("b/*")], Depth::Flat, &at("b"), &mut LeftOut::default())), ["p2.PNG", "p10.png"]);
         for (written, depth, outputs, is_given) in [
             ("a.png", Depth::Flat, "", true),
             ("a.svg", Depth::Flat, "", false),
@@ -300,9 +331,12 @@ mod tests {
         let folder = folder();
         let named = |names: &[&str]| names.iter().map(|name| folder.path().join(name)).collect::<Vec<_>>();
         let elsewhere = Path::new("elsewhere");
-        assert_eq!(relative(find(&named(&["*/p*"]), Depth::Flat, elsewhere)), ["b/p2.PNG", "b/p10.png"]);
+        assert_eq!(
+            relative(find(&named(&["*/p*"]), Depth::Flat, elsewhere, &mut LeftOut::default())),
+            ["b/p2.PNG", "b/p10.png"]
+        );
         let twice = named(&["notes.txt", "gone.png", "notes.txt"]);
-        assert_eq!(relative(find(&twice, Depth::Flat, elsewhere)), ["notes.txt", "gone.png"]);
-        assert!(find(&named(&["*.tif"]), Depth::Flat, elsewhere).is_err(), "nothing matches");
+        assert_eq!(relative(find(&twice, Depth::Flat, elsewhere, &mut LeftOut::default())), ["notes.txt", "gone.png"]);
+        assert!(find(&named(&["*.tif"]), Depth::Flat, elsewhere, &mut LeftOut::default()).is_err(), "nothing matches");
     }
 }

@@ -5,6 +5,7 @@ pub(crate) mod child;
 pub(crate) mod curve_file;
 pub(crate) mod destination;
 pub(crate) mod inputs;
+pub(crate) mod left_out;
 pub(crate) mod memory;
 pub(crate) mod outputs;
 pub(crate) mod pipelines;

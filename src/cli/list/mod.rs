@@ -17,15 +17,17 @@ pub(crate) use self::manifest::ManifestRow;
 use crate::cli::args::picture::PictureArgs;
 use crate::cli::args::typed::Typed;
 use crate::cli::files::inputs::{self, Depth, Givers};
+use crate::cli::files::left_out::LeftOut;
 use crate::cli::jobs::options::PictureOptions;
-use crate::cli::terminal::Verbosity;
+use crate::cli::terminal::{self, Verbosity};
 use crate::error::{Error, Result};
 use crate::vk::Validation;
 
 /// Finds the pictures, and gives each its options and outputs.
 pub(crate) fn find(args: &BatchArgs, typed: &Typed) -> Result<Vec<Item>> {
     let depth = if args.recursive { Depth::Recursive } else { Depth::Flat };
-    let found = inputs::find(&args.inputs, depth, &args.output)?;
+    let mut left_out = LeftOut::default();
+    let found = inputs::find(&args.inputs, depth, &args.output, &mut left_out)?;
     let none = Path::new("-");
     let (manifest, rows) = match &args.manifest {
         Some(path) => (path.as_path(), manifest::read(path)?),
@@ -33,11 +35,16 @@ pub(crate) fn find(args: &BatchArgs, typed: &Typed) -> Result<Vec<Item>> {
     };
     if found.is_empty() && rows.is_empty() {
         let sentence = if args.inputs.is_empty() && args.manifest.is_none() {
-            "name pictures, folders or patterns, or a --manifest; see smalti batch --help"
+            "name pictures, folders or patterns, or a --manifest; see smalti batch --help".to_owned()
+        } else if let Some(told) = left_out.told() {
+            format!("no picture that is read was found, but {told}; name other folders, or add --recursive")
         } else {
-            "no picture was found; name other folders, or add --recursive"
+            "no picture was found; name other folders, or add --recursive".to_owned()
         };
-        return Err(Error::Usage(sentence.to_owned()));
+        return Err(Error::Usage(sentence));
+    }
+    if let Some(sentence) = left_out.sentence().filter(|_| args.messages.verbosity() > Verbosity::Quiet) {
+        terminal::say(&format!("smalti: {sentence}"));
     }
     args.computing.check(Validation::Off)?;
     let options_with = |flags: &[String]| -> Result<PictureOptions> {

@@ -2,6 +2,7 @@
 
 pub mod archives;
 mod encoding;
+mod kinds;
 mod openraster;
 mod outputs;
 mod photos;

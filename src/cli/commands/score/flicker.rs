@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::{ScoreArgs, read, score_each};
 use crate::cli::files::inputs;
+use crate::cli::files::left_out::LeftOut;
 use crate::cli::terminal::{self, advice};
 use crate::error::{Error, Result};
 use crate::metrics::{Difference, Flicker};
@@ -44,12 +45,12 @@ pub(super) fn score(args: &ScoreArgs) -> ExitCode {
 }
 
 fn score_all(args: &ScoreArgs) -> Result<ExitCode> {
-    let reference = inputs::in_folder(&args.reference)?;
+    let reference = inputs::in_folder(&args.reference, &mut LeftOut::default())?;
     score_each(args, |folder| score_one(args, &reference, folder), table)
 }
 
 fn score_one(args: &ScoreArgs, reference: &[PathBuf], folder: &Path) -> Result<FlickerRow> {
-    let paths = inputs::in_folder(folder)?;
+    let paths = inputs::in_folder(folder, &mut LeftOut::default())?;
     if paths.len() != reference.len() {
         let reason = format!("has {} frames and the reference {}; compare the same ones", paths.len(), reference.len());
         return Err(Error::input(folder, reason));

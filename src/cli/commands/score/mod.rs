@@ -178,7 +178,8 @@ fn score_one(reference: &Reference<'_>, path: &Path, background: Rgb) -> Result<
 
 /// Reads a picture, and prints a warning about what was ignored in it.
 pub(crate) fn read(path: &Path, background: Rgb) -> Result<Photo> {
-    let loaded = photo::read(path, &ReadOptions { background: Background::Color(background), long_side_px: None })?;
+    let loaded =
+        photo::read(path, &ReadOptions { background: Background::Color(background), ..ReadOptions::default() })?;
     for warning in &loaded.warnings {
         terminal::error(&format!("{}: {warning}", path.display()));
     }

@@ -14,8 +14,10 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::options::Span;
+use super::rhythm::Rhythm;
 use crate::cli::files::destination;
 use crate::cli::files::inputs::in_folder;
+use crate::cli::files::left_out::LeftOut;
 use crate::cli::film;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
@@ -45,6 +47,9 @@ struct Index {
     frames_per_s: Option<u64>,
     /// The frames in order.
     frames: Vec<Entry>,
+    /// How often each frame comes, one after the other; none if each comes once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    steps: Vec<usize>,
 }
 
 /// A frame as ffmpeg wrote it.
@@ -87,12 +92,29 @@ impl Kept<'_> {
         fs::create_dir_all(parent).map_err(|error| self.unusable(&error))?;
         destination::sweep(parent)?;
         let partial = PartialFolder::create_in(parent)?;
-        let frames_per_s = film::take_apart(video, partial.path(), self.interrupt)?;
-        let paths =
-            in_folder(partial.path()).map_err(|_| Error::input(video, "has no frames that ffmpeg could read"))?;
+        let (frames_per_s, steps) = if photo::frame_count(video)? > 1 {
+            let Rhythm { frames_per_s, steps } = self.take_animation_apart(video, partial.path())?;
+            (Some(frames_per_s), if steps.iter().all(|&count| count == 1) { Vec::new() } else { steps })
+        } else {
+            (film::take_apart(video, partial.path(), self.interrupt)?, Vec::new())
+        };
+        let paths = in_folder(partial.path(), &mut LeftOut::default())
+            .map_err(|_| Error::input(video, "has no frames that ffmpeg could read"))?;
         let frames = paths.par_iter().map(|path| self.entry(path)).collect::<Result<_>>()?;
-        let index = Index { software: SOFTWARE.to_owned(), sha256, frames_per_s, frames };
+        let index = Index { software: SOFTWARE.to_owned(), sha256, frames_per_s, frames, steps };
         self.interrupt.while_writing(|| self.settle(partial, &index))
+    }
+
+    /// Writes the frames of a GIF, APNG or WebP, which needs no ffmpeg, and tells for how long each is shown.
+    fn take_animation_apart(&self, animation: &Path, folder: &Path) -> Result<Rhythm> {
+        let mut shown_ms = Vec::new();
+        photo::take_apart(animation, |frame| {
+            self.interrupt.check()?;
+            shown_ms.push(frame.shown_ms);
+            let path = folder.join(format!("{:08}.png", shown_ms.len()));
+            fs::write(&path, &frame.png).map_err(|error| self.unusable(&error))
+        })?;
+        Ok(Rhythm::of(&shown_ms))
     }
 
     /// The state of the folder for the video with this hash.
@@ -128,7 +150,9 @@ impl Kept<'_> {
             return Ok(false);
         }
         let count = index.frames.len();
-        let span = self.span.map_or(0..count, |span| span.first.min(count)..span.end.min(count));
+        // Where frames come more than once, a place in the sequence is none among the files.
+        let span = self.span.filter(|_| index.steps.is_empty());
+        let span = span.map_or(0..count, |span| span.first.min(count)..span.end.min(count));
         let is_whole = |entry: &Entry| match self.sha256_of(&self.folder.join(&entry.name)) {
             Ok(sha256) => Ok(sha256 == entry.sha256),
             Err(Error::Interrupted) => Err(Error::Interrupted),
@@ -168,7 +192,9 @@ impl Kept<'_> {
     }
 
     fn frames(&self, index: &Index) -> Frames {
-        let paths = index.frames.iter().map(|entry| self.folder.join(&entry.name)).collect();
+        let steps = index.steps.iter().copied().chain(std::iter::repeat(1));
+        let times = |(entry, count): (&Entry, usize)| std::iter::repeat_n(self.folder.join(&entry.name), count);
+        let paths = index.frames.iter().zip(steps).flat_map(times).collect();
         Frames { paths, frames_per_s: index.frames_per_s }
     }
 

@@ -9,6 +9,7 @@ mod frame;
 mod input;
 mod options;
 mod plan;
+mod rhythm;
 mod show;
 mod store;
 

@@ -37,7 +37,7 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct VideoArgs {
-    /// Folder of frames, frames in their order, or a video that ffmpeg reads
+    /// Folder of frames, frames in their order, an animation (GIF, APNG, WebP), or a video that ffmpeg reads
     #[arg(value_name = "FRAMES", required = true)]
     pub inputs: Vec<PathBuf>,
 
