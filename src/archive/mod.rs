@@ -6,6 +6,7 @@
 //! population changes nothing. For programs that do not read `.npz` there are tables (`table.rs`), which smalti does
 //! not read back.
 
+mod array_header;
 mod encode;
 mod read;
 mod table;

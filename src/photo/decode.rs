@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::{Photo, color, jpeg_segments, resize};
 use crate::error::{Error, Result};
+use crate::guard;
 
 /// Largest side in px of a picture that is read.
 pub const SIDE_MAX_PX: u32 = 65_535;
@@ -84,7 +85,9 @@ pub struct Loaded {
 /// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, or exceeds
 /// [`SIDE_MAX_PX`], [`PIXEL_COUNT_MAX`] or 4 GiB.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
-    Decoded::read(path).map(|decoded| decoded.into_fitted(options))
+    let decoded = Decoded::read(path)?;
+    // Colours are brought to sRGB by what the file says, too.
+    guard::decoded(|| Ok(decoded.into_fitted(options))).map_err(|reason| Error::input(path, reason))
 }
 
 /// A picture as it is stored, from which it can be fitted more than once.
@@ -193,7 +196,9 @@ pub fn decoding_bytes(path: &Path) -> u64 {
         reader.format().filter(|&format| is_read(format))?;
         reader.into_dimensions().ok()
     };
-    size()
+    guard::caught(size)
+        .ok()
+        .flatten()
         .filter(|&size| check_size(size).is_ok())
         .map_or(0, |(width_px, height_px)| u64::from(width_px) * u64::from(height_px) * BYTES_PER_DECODED_PIXEL)
 }
@@ -279,6 +284,10 @@ pub(super) struct Raw {
 
 /// The picture in `bytes` as it is stored, within the limits, or a sentence that says why there is none.
 pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat) -> Result<Raw, String> {
+    guard::decoded(|| decode_unguarded(bytes, format))
+}
+
+fn decode_unguarded(bytes: &[u8], format: ImageFormat) -> Result<Raw, String> {
     let broken = |error: ImageError| why_undecodable(format, error);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.limits(limits());

@@ -7,6 +7,7 @@ use image::{DynamicImage, ImageFormat};
 use super::decode::{decode_raw, known_format, read_picture_file};
 use super::{color, resize};
 use crate::error::{Error, Result};
+use crate::guard;
 
 /// The luma of the map at `path`, resized to the size of its picture, row by row from the top. 0 is where the picture
 /// matters least and 255 where it matters most.
@@ -32,6 +33,10 @@ pub fn decode_weights(bytes: &[u8], width_px: u32, height_px: u32) -> Result<Vec
 }
 
 fn weights(bytes: &[u8], format: ImageFormat, size_px: (u32, u32)) -> Result<Vec<u8>, String> {
+    guard::decoded(|| weights_unguarded(bytes, format, size_px))
+}
+
+fn weights_unguarded(bytes: &[u8], format: ImageFormat, size_px: (u32, u32)) -> Result<Vec<u8>, String> {
     let raw = decode_raw(bytes, format)?;
     let mut map = DynamicImage::ImageLuma8(color::to_luma_over_black(raw.image, raw.profile.as_deref()));
     map.apply_orientation(raw.orientation);

@@ -24,6 +24,7 @@ mod front_door_bounds;
 mod glazed_vulkan;
 mod grout;
 mod guides;
+mod hostile_files;
 mod labels;
 mod lanes_vulkan;
 mod layering;
