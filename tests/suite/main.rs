@@ -26,6 +26,7 @@ mod grout;
 mod guides;
 mod hostile_files;
 mod hostile_svgs;
+mod hostile_texts;
 mod labels;
 mod lanes_vulkan;
 mod layering;
