@@ -25,6 +25,7 @@ mod glazed_vulkan;
 mod grout;
 mod guides;
 mod hostile_files;
+mod hostile_names;
 mod hostile_svgs;
 mod hostile_texts;
 mod labels;
