@@ -55,6 +55,7 @@ mod error;
 pub mod evolve;
 #[doc(hidden)]
 pub mod gpu;
+mod guard;
 #[doc(hidden)]
 pub mod guide;
 mod memory;

@@ -12,6 +12,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use crate::error::{Error, Result};
+use crate::guard;
 use crate::model::blocks::{depth_order, index_of};
 use crate::model::{Backdrop, Canvas, Fly, Mosaic, Painter, Population, Rgb};
 use crate::photo::{self, Format, Metadata, Photo};
@@ -180,13 +181,13 @@ fn stack(layers: &Layers) -> String {
 /// [`Error::Input`] if the file cannot be opened.
 pub fn read_metadata(path: &Path) -> Result<Metadata> {
     let file = File::open(path).map_err(|error| Error::input(path, photo::why_unreadable(&error)))?;
-    let mut header = Vec::new();
-    if let Ok(mut zip) = ZipArchive::new(BufReader::new(file))
-        && let Ok(merged) = zip.by_name(MERGED_MEMBER)
-        && merged.take(METADATA_BYTES).read_to_end(&mut header).is_err()
-    {
-        header.clear();
-    }
+    let begin_of_merged = || -> Option<Vec<u8>> {
+        let mut header = Vec::new();
+        let mut zip = ZipArchive::new(BufReader::new(file)).ok()?;
+        zip.by_name(MERGED_MEMBER).ok()?.take(METADATA_BYTES).read_to_end(&mut header).ok()?;
+        Some(header)
+    };
+    let header = guard::caught(begin_of_merged).ok().flatten().unwrap_or_default();
     Ok(photo::png_metadata(&header))
 }
 
@@ -200,7 +201,7 @@ pub fn is_whole(path: &Path) -> bool {
         }
         Ok(())
     };
-    check().is_ok()
+    guard::caught(check).is_ok_and(|checked| checked.is_ok())
 }
 
 #[cfg(test)]

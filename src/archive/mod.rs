@@ -6,6 +6,7 @@
 //! population changes nothing. For programs that do not read `.npz` there are tables (`table.rs`), which smalti does
 //! not read back.
 
+mod array_header;
 mod encode;
 mod read;
 mod table;
@@ -17,7 +18,9 @@ use crate::model::{Blend, Grout, Population, Rgb};
 
 pub use encode::{encode, encode_snapshot};
 pub use read::{decode, is_cut_short, read, read_meta};
-pub use table::{KEY_DIGITS, encode_csv, encode_json, read_csv_meta, read_json_meta};
+pub use table::{
+    KEY_DIGITS, encode_csv, encode_json, is_csv_without_rows, is_whole_csv, read_csv_meta, read_json_meta,
+};
 
 /// Version of the file's layout.
 const SCHEMA: u32 = 1;

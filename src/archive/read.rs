@@ -9,8 +9,10 @@ use serde_json::{Map, Value};
 use zip::ZipArchive;
 use zip::result::ZipError;
 
+use super::array_header::{self, ARRAY_HEADER_BYTES_MAX};
 use super::{Archive, GENE_COLUMNS, GroutEntry, HEADER_MEMBER, Header, SCHEMA};
 use crate::error::{Error, Result};
+use crate::guard;
 use crate::model::fly::{Genes, SIDE_MAX, SIDE_MIN, UNITS_PER_PX};
 use crate::model::grout::GROUT_WIDTH_MAX;
 use crate::model::mask::{MASK_LAYERS_MAX, MASK_SIDE, Texel};
@@ -23,8 +25,6 @@ use crate::photo;
 const COLUMN_BYTES_MAX: u64 = 8 * FLY_COUNT_MAX as u64 + ARRAY_HEADER_BYTES_MAX as u64 + 16;
 /// Most bytes of `meta.json`.
 const HEADER_BYTES_MAX: u64 = 1 << 20;
-/// Most bytes of the text that describes an array; numpy writes about 120.
-const ARRAY_HEADER_BYTES_MAX: usize = 4096;
 
 /// Reads the population at `path`, whether smalti or numpy wrote it.
 ///
@@ -35,7 +35,7 @@ const ARRAY_HEADER_BYTES_MAX: usize = 4096;
 /// column has the wrong type or length; if a value is not finite, or out of a gene's range by more than rounding; or if
 /// a fly wears a mask that does not exist.
 pub fn read(path: &Path) -> Result<Archive> {
-    Members::open(path).and_then(read_population).map_err(|reason| Error::input(path, reason))
+    guard::decoded(|| Members::open(path).and_then(read_population)).map_err(|reason| Error::input(path, reason))
 }
 
 /// As [`read`], of the population that a file of these bytes would hold.
@@ -43,7 +43,7 @@ pub fn read(path: &Path) -> Result<Archive> {
 /// # Errors
 /// A sentence without the file's name.
 pub fn decode(bytes: &[u8]) -> Result<Archive, String> {
-    Members::of(Cursor::new(bytes)).and_then(read_population)
+    guard::decoded(|| Members::of(Cursor::new(bytes)).and_then(read_population))
 }
 
 /// The metadata of the population at `path`, without reading the population.
@@ -51,8 +51,7 @@ pub fn decode(bytes: &[u8]) -> Result<Archive, String> {
 /// # Errors
 /// [`Error::Input`] if the file cannot be read or is not a population.
 pub fn read_meta(path: &Path) -> Result<Map<String, Value>> {
-    Members::open(path)
-        .and_then(|mut members| members.header())
+    guard::decoded(|| Members::open(path)?.header())
         .map(|header| header.meta)
         .map_err(|reason| Error::input(path, reason))
 }
@@ -68,7 +67,8 @@ pub fn is_cut_short(path: &Path) -> bool {
         return false;
     }
     let length = begin.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
-    BEGIN.starts_with(&begin[..length]) && ZipArchive::new(BufReader::new(file)).is_err()
+    let opens = || guard::caught(|| ZipArchive::new(BufReader::new(file)).is_ok()).unwrap_or(false);
+    BEGIN.starts_with(&begin[..length]) && !opens()
 }
 
 fn read_population<R: Read + Seek>(mut members: Members<R>) -> Result<Archive, String> {
@@ -268,19 +268,8 @@ impl<R: Read + Seek> Members<R> {
 
 /// The array in a member, with its header parsed.
 fn array<'a>(name: &str, bytes: &'a [u8]) -> Result<NpyFile<&'a [u8]>, String> {
-    if array_header_bytes(bytes).is_none_or(|length| length > ARRAY_HEADER_BYTES_MAX) {
-        return Err(format!("its `{name}` is not an array of numpy"));
-    }
+    array_header::check(bytes).map_err(|reason| format!("its `{name}` {reason}"))?;
     NpyFile::new(bytes).map_err(|error| format!("its `{name}` is not an array of numpy ({error})"))
-}
-
-/// Length of the text that describes an array. It is a Python literal, and parsing a long one could overflow the stack.
-fn array_header_bytes(bytes: &[u8]) -> Option<usize> {
-    let version = *bytes.get(6)?;
-    if version == 1 {
-        return Some(usize::from(u16::from_le_bytes(*bytes.get(8..)?.first_chunk()?)));
-    }
-    usize::try_from(u32::from_le_bytes(*bytes.get(8..)?.first_chunk()?)).ok()
 }
 
 fn column_of<T: Deserialize>(name: &str, bytes: &[u8], type_name: &str) -> Result<Vec<T>, String> {

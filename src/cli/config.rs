@@ -13,7 +13,7 @@ use clap::{Arg, ArgMatches, Command};
 use toml::{Table, Value};
 
 use crate::error::{Error, Result};
-use crate::photo;
+use crate::studio::{SETTINGS_BYTES_MAX, read_text, toml_mistake};
 
 /// The command line as typed, with the flags that the file of `--config` adds at its end. `whole` defines all commands.
 ///
@@ -43,10 +43,10 @@ struct File<'a> {
 
 impl<'a> File<'a> {
     fn read(path: &'a Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::input(path, photo::why_unreadable(&error)))?;
+        let text = read_text(path, "a file of flags", SETTINGS_BYTES_MAX)?;
         let table = text.parse().map_err(|error: toml::de::Error| {
-            let error = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-            Error::input(path, format!("is not TOML ({error}); write lines such as tiles = 4000"))
+            let mistake = toml_mistake(&text, &error);
+            Error::input(path, format!("is not TOML ({mistake}); write lines such as tiles = 4000"))
         })?;
         Ok(Self { path, table })
     }

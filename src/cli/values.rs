@@ -1,6 +1,7 @@
 //! The values that people type: counts with suffixes, durations, and the bounds of flags. Each error says what would be
 //! right.
 
+use std::borrow::Cow;
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -39,6 +40,14 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
     whole(digits)
         .and_then(|number| number.checked_mul(factor))
         .ok_or_else(|| "expected a whole number such as 500, 40k or 2M".to_owned())
+}
+
+/// A text as a cell of a CSV table. Spreadsheets take a cell for a formula that begins like one, and run it; with an
+/// apostrophe in front it is text. Numbers stay numbers.
+pub(crate) fn table_cell(text: &str) -> Cow<'_, str> {
+    let is_plain_number = text.parse::<f64>().is_ok() && !text.contains(|c: char| c.is_ascii_alphabetic() && c != 'e');
+    let may_be_formula = text.len() > 1 && text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n']);
+    if may_be_formula && !is_plain_number { Cow::Owned(format!("'{text}")) } else { Cow::Borrowed(text) }
 }
 
 /// A number with or without decimals, such as `1` or `0.5`. The flag itself checks whether it is finite and in range.
@@ -107,6 +116,16 @@ mod tests {
         assert_eq!(duration("1h30m"), Ok(Duration::from_secs(5_400)));
         for text in ["", "s", "30 s", "-1s", "1d", "1s5", "99999999999999999999s", "9999999999999999999h"] {
             assert!(duration(text).is_err(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_cell_that_a_spreadsheet_would_run_becomes_text_and_numbers_stay() {
+        for text in ["=1+2", "+cmd|' /C calc'!A0", "-2+3", "@SUM(A1)", "\t=1", "\r=1", "-inf", "+1e5x"] {
+            assert_eq!(table_cell(text), format!("'{text}"));
+        }
+        for text in ["", "-", "-5", "+5", "-0.25", "-1e-7", "a=b", "in/-x.png", "'=1"] {
+            assert_eq!(table_cell(text), text);
         }
     }
 }

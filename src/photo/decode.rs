@@ -12,7 +12,7 @@ use super::kinds::{Kind, READ, SIGNATURE_BYTES, kind_of};
 use super::raw::{CutShort, Raw, Space, by_image, check_memory, check_size, limits};
 use super::{Photo, color, frames, from_jpeg, from_png, from_tiff, jpeg_segments, resize};
 use crate::error::{Error, Result};
-use crate::memory;
+use crate::{guard, memory};
 
 /// Bytes per pixel while a picture is decoded. A pixel takes up to eight as it is stored; copies of it are in sRGB and
 /// turned upright.
@@ -79,7 +79,9 @@ pub struct Loaded {
 /// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, exceeds
 /// [`super::SIDE_MAX_PX`], [`super::PIXEL_COUNT_MAX`] or 4 GiB, or takes more memory to decode than is free.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<Loaded> {
-    Decoded::read(path, options.cut_short).map(|decoded| decoded.into_fitted(options))
+    let decoded = Decoded::read(path, options.cut_short)?;
+    // Colours are brought to sRGB by what the file says, too.
+    guard::decoded(|| Ok(decoded.into_fitted(options))).map_err(|reason| Error::input(path, reason))
 }
 
 /// A picture as it is stored, from which it can be fitted more than once.
@@ -193,7 +195,9 @@ pub fn decoding_bytes(path: &Path) -> u64 {
         reader.limits(limits());
         reader.into_dimensions().ok()
     };
-    size()
+    guard::caught(size)
+        .ok()
+        .flatten()
         .filter(|&size| check_size(size).is_ok())
         .map_or(0, |(width_px, height_px)| u64::from(width_px) * u64::from(height_px) * BYTES_PER_DECODED_PIXEL)
 }
@@ -278,6 +282,10 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
 
 /// The picture in `bytes` as it is stored, within the limits, or a sentence that says why there is none.
 pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> Result<Raw, String> {
+    guard::decoded(|| decode_unguarded(bytes, format, cut_short))
+}
+
+fn decode_unguarded(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> Result<Raw, String> {
     let mut raw = match format {
         ImageFormat::Jpeg => from_jpeg::decode(bytes, cut_short),
         ImageFormat::Png => from_png::decode(bytes, cut_short),

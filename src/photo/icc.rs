@@ -9,6 +9,8 @@ use std::sync::Arc;
 
 use moxcms::{ColorProfile, DataColorSpace, Layout, ToneReprCurve, Transform16BitExecutor, TransformOptions};
 
+use crate::guard;
+
 /// From three channels to three.
 pub(super) type Matrix = [[f64; 3]; 3];
 
@@ -54,6 +56,11 @@ pub(super) fn srgb_of_inks(icc: &[u8], inks: &[u8]) -> Result<Vec<u8>, String> {
 impl Profile {
     /// The profile in `icc` for a picture that has colour or is grey, or the reason why it cannot be used.
     pub(super) fn parse(icc: &[u8], has_color: bool) -> Result<Self, String> {
+        guard::caught(|| Self::parse_unguarded(icc, has_color))
+            .unwrap_or_else(|panicked| Err(format!("it is broken ({panicked})")))
+    }
+
+    fn parse_unguarded(icc: &[u8], has_color: bool) -> Result<Self, String> {
         let profile = ColorProfile::new_from_slice(icc).map_err(|error| format!("it is broken ({error})"))?;
         match (profile.color_space, has_color) {
             (DataColorSpace::Rgb | DataColorSpace::Gray, _) if profile.pcs == DataColorSpace::Xyz => {

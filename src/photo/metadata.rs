@@ -10,6 +10,7 @@ use std::path::Path;
 use super::decode::why_unreadable;
 use super::{jpeg_segments, webp};
 use crate::error::{Error, Result};
+use crate::guard;
 
 /// Keywords with their texts, in the order in which they are written.
 ///
@@ -97,6 +98,10 @@ fn read_header(path: &Path) -> Result<Vec<u8>> {
 
 /// The text chunks before the pixels of a PNG file that begins with `header`; empty if it is not a PNG.
 pub(crate) fn png_metadata(header: &[u8]) -> Metadata {
+    guard::caught(|| png_texts(header)).unwrap_or_default()
+}
+
+fn png_texts(header: &[u8]) -> Metadata {
     let limits = png::Limits { bytes: HEADER_BYTES as usize };
     let Ok(reader) = png::Decoder::new_with_limits(std::io::Cursor::new(header), limits).read_info() else {
         return Metadata::new();

@@ -96,8 +96,11 @@ pub fn read_palette(path: &Path) -> Result<Vec<[u8; 3]>> {
     }
     let mut bytes = Vec::new();
     File::open(path)
-        .and_then(|file| file.take(TEXT_BYTES_MAX).read_to_end(&mut bytes))
+        .and_then(|file| file.take(TEXT_BYTES_MAX + 1).read_to_end(&mut bytes))
         .map_err(|error| refused(why_unreadable(&error)))?;
+    if bytes.len() as u64 > TEXT_BYTES_MAX {
+        return Err(refused("has more than 1 MiB, the limit for a palette; name another file".to_owned()));
+    }
     let listed = parse_palette(&String::from_utf8_lossy(&bytes)).map_err(|line| {
         refused(format!(
             "is not a palette: line {line} is not a colour; use a GIMP palette, a JASC palette, \

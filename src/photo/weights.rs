@@ -9,6 +9,7 @@ use super::kinds::{Kind, kind_of};
 use super::raw::CutShort;
 use super::{color, resize};
 use crate::error::{Error, Result};
+use crate::guard;
 
 /// The luma of the map at `path`, resized to the size of its picture, row by row from the top. 0 is where the picture
 /// matters least and 255 where it matters most.
@@ -38,6 +39,15 @@ pub fn decode_weights(bytes: &[u8], width_px: u32, height_px: u32) -> Result<Vec
 }
 
 fn weights(bytes: &[u8], format: ImageFormat, size_px: (u32, u32), cut_short: CutShort) -> Result<Vec<u8>, String> {
+    guard::decoded(|| weights_unguarded(bytes, format, size_px, cut_short))
+}
+
+fn weights_unguarded(
+    bytes: &[u8],
+    format: ImageFormat,
+    size_px: (u32, u32),
+    cut_short: CutShort,
+) -> Result<Vec<u8>, String> {
     let raw = decode_raw(bytes, format, cut_short)?;
     let mut map = DynamicImage::ImageLuma8(color::to_luma_over_black(raw.image, &raw.space));
     map.apply_orientation(raw.orientation);

@@ -9,6 +9,7 @@ use super::resample::stretched;
 use super::svg;
 use super::template::{Source, Template};
 use crate::error::{Error, Result};
+use crate::guard;
 use crate::photo::{self, Stencil};
 
 /// Most bytes of a mask's file: 64 MiB.
@@ -49,7 +50,8 @@ fn ink_in(bytes: &[u8], looks_like_svg: bool) -> Result<Vec<Ink>, String> {
     let mut ink = if bytes.is_empty() {
         Err("the file is empty (0 bytes); get it again".to_owned())
     } else if photo::is_picture(bytes) {
-        photo::decode_stencil(bytes).map(|stencil| stretched(&ink_of(&stencil), stencil.width_px, stencil.height_px))
+        guard::decoded(|| photo::decode_stencil(bytes))
+            .map(|stencil| stretched(&ink_of(&stencil), stencil.width_px, stencil.height_px))
     } else if bytes.starts_with(&GZIP_SIGNATURE) {
         Err("is compressed; unpack it with gunzip and name the SVG".to_owned())
     } else if looks_like_svg || svg::is_svg(bytes) {

@@ -40,7 +40,11 @@ impl Wardrobe {
         let mut others: Vec<Mask> = Vec::new();
         let mut layers = Vec::with_capacity(outfits.len());
         let square = Mask::square();
-        for outfit in outfits {
+        for (index, outfit) in outfits.iter().enumerate() {
+            if let Some(known) = outfits[..index].iter().position(|earlier| earlier == outfit) {
+                layers.push(layers[known]);
+                continue;
+            }
             let mask = match blend {
                 Blend::Opaque => outfit.shader.mask(&outfit.template),
                 Blend::Translucent => thinned(&outfit.shader.mask(&outfit.template), opacity),

@@ -9,6 +9,7 @@ use super::parameters::{contradiction, real_in_range};
 use super::presets::{PaperPreset, Shaders};
 use crate::error::{Error, Result};
 use crate::evolve::style::Style;
+use crate::model::mask::MASK_LAYERS_MAX;
 use crate::model::{Blend, MaskSet};
 use crate::shapes::{self, BuiltIn, Outfit, Shader, Source, Template, Wardrobe};
 
@@ -126,6 +127,9 @@ pub(crate) struct Look {
     opacity: NonZeroU8,
 }
 
+/// Most masks that may be named together: a set of masks has room for these and the square.
+pub(super) const MASK_COUNT_MAX: usize = MASK_LAYERS_MAX - 1;
+
 /// Why a population's own masks stay as they are.
 pub(crate) const KEEPS_MASKS: &str =
     "a population keeps its masks as they were shaded and blended; name the mask to change to with `mask`";
@@ -152,6 +156,11 @@ impl Look {
     /// # Errors
     /// [`Error::Parameter`] if they contradict each other.
     pub(crate) fn new(choices: &LookChoices, restart_masks: &[Mask], preset: Option<PaperPreset>) -> Result<Self> {
+        let mask_count = choices.masks.len() + restart_masks.len();
+        if mask_count > MASK_COUNT_MAX {
+            let reason = format!("{mask_count} masks are named, and at most {MASK_COUNT_MAX} are possible; drop some");
+            return Err(contradiction("mask", reason));
+        }
         let opacity = real_in_range("opacity", choices.opacity.unwrap_or(1.0), 0.01..=1.0, "")?;
         let blend = match choices.blend {
             Some(Blend::Translucent) => Blend::Translucent,
@@ -229,8 +238,18 @@ impl Look {
         Ok(Dress { masks, layers_by_run: vec![Vec::new(), shifted] })
     }
 
+    /// A mask that is named more than once is read once, and stands there as often as it is named: flies choose among
+    /// the outfits.
     fn outfits(&self, masks: &[Mask]) -> Result<Vec<Outfit>> {
-        masks.iter().map(|mask| Ok(Outfit { template: mask.template()?, shader: self.shader })).collect()
+        let mut outfits: Vec<Outfit> = Vec::with_capacity(masks.len());
+        for (index, mask) in masks.iter().enumerate() {
+            let template = match masks[..index].iter().position(|earlier| earlier == mask) {
+                Some(known) => outfits[known].template.clone(),
+                None => mask.template()?,
+            };
+            outfits.push(Outfit { template, shader: self.shader });
+        }
+        Ok(outfits)
     }
 
     /// What flies wear that were given no mask: the square, shaded only if it is all that there is.

@@ -36,6 +36,7 @@ mod provenance;
 mod recipe;
 mod session;
 mod settings;
+mod text_file;
 mod tile;
 mod words;
 
@@ -66,4 +67,5 @@ pub(crate) use self::provenance::{
     KEYWORD, Provenance, Provenances, SOFTWARE, Told, picture_metadata, population_sha256, without_header,
 };
 pub(crate) use self::settings::{SchemeSettings, Settings};
+pub(crate) use self::text_file::{SETTINGS_BYTES_MAX, read_text, text_of, toml_mistake};
 pub(crate) use self::words::{color, color_count, grout_color};

@@ -220,7 +220,7 @@ impl Mosaic {
         self.encode(Content::Population)
     }
 
-    /// The flies as a CSV table.
+    /// The living flies as a CSV table.
     ///
     /// # Errors
     /// If it cannot be encoded.

@@ -8,9 +8,10 @@ use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 
 use super::choices::{Colors, GroutColor};
-use super::look::Mask;
+use super::look::{MASK_COUNT_MAX, Mask};
 use super::parameters::in_range;
 use super::recipe::Recipe;
+use super::text_file::{SETTINGS_BYTES_MAX, read_text, toml_mistake};
 use super::words;
 use crate::error::{Error, Result};
 use crate::evolve::ColorMode;
@@ -234,22 +235,14 @@ impl Preset {
     /// # Errors
     /// [`Error::Input`] that names the line and what is allowed.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|error| match error.kind() {
-            std::io::ErrorKind::NotFound => Error::input(path, "there is no such file"),
-            _ => Error::input(path, format!("cannot be read as text ({error})")),
-        })?;
+        let text = read_text(path, "a preset", SETTINGS_BYTES_MAX)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::parse(&text, folder).map_err(|reason| Error::input(path, reason))
     }
 
     /// Reads a preset; masks that are files lie in `folder`, unless their paths are absolute.
     fn parse(text: &str, folder: &Path) -> Result<Self, String> {
-        let mut file: Self = toml::from_str(text).map_err(|error| {
-            let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
-            let place = line.map_or(String::new(), |line| format!("line {line}: "));
-            let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
-            format!("{place}{message}")
-        })?;
+        let mut file: Self = toml::from_str(text).map_err(|error| toml_mistake(text, &error))?;
         file.check()?;
         for mask in file.masks.iter_mut().filter(|mask| mask.extension().is_some()) {
             *mask = folder.join(&mask);
@@ -271,6 +264,12 @@ impl Preset {
         }
         if self.classes.len() > CLASSES_MAX {
             return Err(format!("has {} classes, and at most {CLASSES_MAX} are possible", self.classes.len()));
+        }
+        if self.masks.len() > MASK_COUNT_MAX {
+            return Err(format!(
+                "names {} masks, and at most {MASK_COUNT_MAX} are possible; drop some",
+                self.masks.len()
+            ));
         }
         if self.has_no_grout() && self.grout_width.is_some() {
             return Err("grout = \"none\" and grout-width contradict each other; drop one".to_owned());

@@ -16,6 +16,49 @@ fn is_partial(name: &str) -> bool {
 }
 
 #[test]
+fn a_table_with_dead_tiles_of_an_older_version_is_made_anew_and_nothing_else_is() {
+    let workshop = Workshop::new();
+    std::fs::create_dir(workshop.path("in")).unwrap();
+    image::RgbImage::new(20, 20).save(workshop.path("in/black.png")).unwrap();
+    workshop.paint("in/a.png", 40, 30);
+    // So few evals that not all tiles are born; on black none is.
+    let line = "batch in -o out -n 400 --evals 200 --format png,csv --progress none";
+    let run = || {
+        let ran = workshop.run(line);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    };
+    run();
+    let table = String::from_utf8(workshop.read("out/a.csv")).unwrap();
+    let (head, rows) = table.split_once('\n').unwrap();
+    assert!(head.ends_with(",key,living") && !rows.contains(",false,"), "{head}");
+    assert_eq!(
+        rows.lines().count(),
+        rows.lines().next().unwrap().rsplit(',').next().unwrap().parse::<usize>().unwrap()
+    );
+    let empty = workshop.read("out/black.csv");
+    assert_eq!(empty.iter().filter(|&&byte| byte == b'\n').count(), 1);
+    // As it was before: without the last column, and with the dead tiles.
+    let mut old = head.strip_suffix(",living").unwrap().to_owned() + "\n";
+    for row in rows.lines() {
+        old += row.rsplit_once(',').unwrap().0;
+        old += "\n";
+    }
+    let dead = old.lines().last().unwrap().replace(",true,", ",false,") + "\n";
+    let missing = 400 - rows.lines().count();
+    workshop.write("out/a.csv", (old + &dead.repeat(missing)).as_bytes());
+    let picture = workshop.path("out/a.png").metadata().unwrap().modified().unwrap();
+    run();
+    assert_eq!(String::from_utf8(workshop.read("out/a.csv")).unwrap(), table);
+    assert_eq!(workshop.read("out/black.csv"), empty);
+    assert_eq!(workshop.path("out/a.png").metadata().unwrap().modified().unwrap(), picture);
+    let one = "evolve in/black.png -n 400 --evals 200 -o black.csv";
+    for _ in 0..2 {
+        let ran = workshop.run(one);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    }
+}
+
+#[test]
 fn every_format_is_made_anew_wherever_it_was_cut_short() {
     let workshop = Workshop::new();
     paint(&workshop, &["in/a.png"]);

@@ -6,7 +6,7 @@ use crate::sources::{Source, code, ends_of, is_word_char, source, sources};
 
 /// The modules of the crate, lowest level first. A module imports only modules of lower levels.
 const LEVELS: [&[&str]; 8] = [
-    &["error", "memory"],
+    &["error", "guard", "memory"],
     &["photo", "output", "model", "metrics", "plot"],
     &["archive", "evolve", "guide", "shapes", "cpu", "vk", "vector", "openraster"],
     &["gpu"],

@@ -2,6 +2,8 @@
 //! Markdown.
 
 use std::fmt::Write;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -94,7 +96,9 @@ fn check_folder(folder: &Path, page: &Path, overwrite: Overwrite) -> Result<()> 
     if folder.is_file() {
         return Err(Error::Usage(format!("{} is a file; name a folder", folder.display())));
     }
-    let is_gallery = std::fs::read(page).is_ok_and(|bytes| bytes.starts_with(TITLE.as_bytes()));
+    let mut head = Vec::new();
+    let read = File::open(page).and_then(|file| file.take(TITLE.len() as u64).read_to_end(&mut head));
+    let is_gallery = read.is_ok() && head == TITLE.as_bytes();
     let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
     if is_gallery || is_empty || overwrite == Overwrite::Force {
         return Ok(());
@@ -174,14 +178,14 @@ fn markdown(args: &GalleryArgs) -> String {
         let _ = write!(page, "\n## `{name}`\n\n{description}{blend}.\n\n![{name}]({file})\n\nFrom left: {columns}.\n");
     }
     let names: Vec<String> = args.inputs.iter().map(|path| path.display().to_string()).collect();
+    let (names, output) = (names.join(" "), args.output.display());
+    let (births, seed) = (args.births, args.mosaics.seed);
+    let command = format!("smalti gallery {names} -o {output} --births {births} --seed {seed}");
     let _ = write!(
         page,
-        "\nMade by `smalti gallery {} -o {} --births {} --seed {}`: {FLY_COUNT} tiles at {SIDE_PX} px, {} runs with steps \
+        "\nMade by {}: {FLY_COUNT} tiles at {SIDE_PX} px, {} runs with steps \
          halved at each, mean colours; {} are translucent.\n",
-        names.join(" "),
-        args.output.display(),
-        args.births,
-        args.mosaics.seed,
+        code(&command),
         RESTARTS + 1,
         Shader::ALL
             .iter()
@@ -191,4 +195,25 @@ fn markdown(args: &GalleryArgs) -> String {
             .join(", ")
     );
     page
+}
+
+/// A text as code in Markdown, on one line and whatever is in it.
+fn code(text: &str) -> String {
+    let text = terminal::shown(text);
+    let longest = text.split(|c| c != '`').map(str::len).max().unwrap_or_default();
+    let fence = "`".repeat(longest + 1);
+    let space = if longest > 0 { " " } else { "" };
+    format!("{fence}{space}{text}{space}{fence}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::code;
+
+    #[test]
+    fn no_name_leaves_the_code_that_it_stands_in() {
+        assert_eq!(code("smalti gallery a.png"), "`smalti gallery a.png`");
+        assert_eq!(code("a `b` <i>.png"), "`` a `b` <i>.png ``");
+        assert_eq!(code("```\n# x"), "```` ```\\n# x ````");
+    }
 }

@@ -2,8 +2,10 @@
 
 use super::destination::{Destination, Overwrite};
 use super::story;
+use crate::archive;
 use crate::error::{Error, Result};
 use crate::evolve::Ending;
+use crate::studio::Content;
 
 /// Refuses to replace a file that the same command, perhaps interrupted, would not have written.
 pub(crate) fn check_replaceable(destination: &Destination, key: &str, overwrite: Overwrite) -> Result<()> {
@@ -12,6 +14,7 @@ pub(crate) fn check_replaceable(destination: &Destination, key: &str, overwrite:
     }
     let why = match story::story_of_file(destination) {
         Some(found) if found.is_of(key) => return Ok(()),
+        None if destination.content == Content::Csv && archive::is_csv_without_rows(&destination.path) => return Ok(()),
         Some(_) => "made with other options",
         None => "not made by smalti",
     };

@@ -1,16 +1,16 @@
 //! The manifest of a batch: one picture on each line, as JSON.
 
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::error::{Error, Result};
-use crate::photo;
+use crate::studio::{read_text, text_of};
 
-/// Most bytes of a manifest: some ten million pictures.
-const BYTES_MAX: u64 = 1 << 30;
+/// Most bytes of a manifest: some five million pictures.
+const BYTES_MAX: u64 = 1 << 29;
+const WHAT: &str = "a manifest, which has one JSON object on each line";
 
 /// A line of a manifest.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
@@ -104,19 +104,11 @@ pub(crate) fn read(path: &Path) -> Result<Vec<(usize, ManifestRow)>> {
 }
 
 fn text(path: &Path) -> Result<String> {
-    let mut text = String::new();
-    let read = if path == Path::new("-") {
-        std::io::stdin().lock().take(BYTES_MAX).read_to_string(&mut text)
+    if path == Path::new("-") {
+        text_of(std::io::stdin().lock(), path, WHAT, BYTES_MAX)
     } else {
-        std::fs::File::open(path).and_then(|file| file.take(BYTES_MAX).read_to_string(&mut text))
-    };
-    read.map_err(|error| match error.kind() {
-        std::io::ErrorKind::InvalidData => {
-            Error::input(path, "is not text; a manifest has one JSON object on each line, in UTF-8")
-        }
-        _ => Error::input(path, photo::why_unreadable(&error)),
-    })?;
-    Ok(text)
+        read_text(path, WHAT, BYTES_MAX)
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Reads result rows back, and decides which one counts if there are several of the same picture.
 
 use std::collections::HashMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -11,7 +11,11 @@ use serde::de::IgnoredAny;
 use crate::error::{Error, Result};
 
 /// Most bytes of a line: more than any row has.
-const ROW_BYTES_MAX: u64 = 1 << 20;
+pub(crate) const ROW_BYTES_MAX: u64 = 1 << 20;
+/// Most bytes of a file of rows: some four million pictures.
+const FILE_BYTES_MAX: u64 = 1 << 32;
+/// Most lines of a file that may be no rows.
+const BAD_LINES_MAX: usize = 1_000;
 
 /// A row of results.
 #[derive(Clone, Debug)]
@@ -59,28 +63,49 @@ impl Rows {
     /// [`Error::Input`] if the file cannot be read, if none of its lines is a row, or if a line is neither a row nor
     /// the beginning of one.
     pub(crate) fn read(&mut self, path: &Path) -> Result<Vec<String>> {
-        let bytes = fs::read(path).map_err(|error| Error::input(path, unreadable(&error)))?;
+        let file = File::open(path).map_err(|error| Error::input(path, unreadable(&error)))?;
+        let mut reader = BufReader::new(file.take(FILE_BYTES_MAX));
         let file_name = path.file_name().unwrap_or_default().to_string_lossy();
         let mut last_of_id = HashMap::new();
-        let mut warnings = Vec::new();
-        let mut foreign = None;
-        let lines = (1..).zip(bytes.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii));
-        let lines: Vec<(usize, &[u8])> = lines.filter(|(_, line)| !line.is_empty()).collect();
-        for &(number, line) in &lines {
+        // Lines that are no rows: their numbers, and whether they may stand there all the same, unless they are last.
+        let mut bad_lines: Vec<(usize, bool)> = Vec::new();
+        let (mut line, mut last_number) = (Vec::new(), 0);
+        for number in 1.. {
+            line.clear();
+            let mut limited = reader.by_ref().take(ROW_BYTES_MAX);
+            let length =
+                limited.read_until(b'\n', &mut line).map_err(|error| Error::input(path, unreadable(&error)))?;
+            if length == 0 {
+                break;
+            }
+            let line = line.trim_ascii();
+            if line.is_empty() {
+                continue;
+            }
+            last_number = number;
             if let Some((told, line)) = row(line) {
                 let row = ResultRow { told, line, file_name: file_name.to_string() };
                 last_of_id.insert(row.told.id.clone(), row);
             } else {
-                let is_last = lines.last().is_some_and(|(last, _)| *last == number);
-                if !is_torn(line) && (!is_last || last_of_id.is_empty()) {
-                    foreign.get_or_insert(number);
-                }
-                let path = path.display();
-                warnings.push(format!(
-                    "{path}: line {number} is no whole row, as a killed process leaves it, and is skipped"
-                ));
+                bad_lines.push((number, is_torn(line) && length as u64 != ROW_BYTES_MAX));
+            }
+            if bad_lines.len() > BAD_LINES_MAX {
+                let reason =
+                    format!("has more than {BAD_LINES_MAX} lines that are no rows of results; name another file");
+                return Err(Error::input(path, reason));
             }
         }
+        if reader.get_ref().limit() == 0 {
+            return Err(Error::input(path, "has more than 4 GiB, the limit for rows of results; name another file"));
+        }
+        let is_end_of_rows = |number: usize| number == last_number && !last_of_id.is_empty();
+        let foreign = bad_lines.iter().find(|&&(number, may_be)| !may_be && !is_end_of_rows(number));
+        let foreign = foreign.map(|&(number, _)| number);
+        let warning = |&(number, _): &(usize, bool)| {
+            let path = path.display();
+            format!("{path}: line {number} is no whole row, as a killed process leaves it, and is skipped")
+        };
+        let warnings: Vec<String> = bad_lines.iter().map(warning).collect();
         // A process that was killed at its first picture may leave a single torn line.
         if last_of_id.is_empty() && (warnings.len() > 1 || foreign.is_some()) {
             return Err(Error::input(
@@ -161,6 +186,7 @@ pub(crate) fn holds_result_rows(path: &Path) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::path::PathBuf;
 
     use tempfile::TempDir;

@@ -3,8 +3,11 @@
 pub(crate) mod advice;
 pub(crate) mod interrupt;
 pub(crate) mod progress;
+mod shown;
 
-use std::io::{self, Write};
+pub(crate) use shown::shown;
+
+use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -33,9 +36,14 @@ pub(crate) fn print_json(value: &impl Serialize) -> Result<()> {
     write_stdout(&line)
 }
 
-/// Writes text to stdout. If the reader stops reading, that is no failure: it has what it wants.
+/// Writes text to stdout; if that is a terminal, with its control characters spelt out. If the reader stops reading,
+/// that is no failure: it has what it wants.
 pub(crate) fn write_stdout(bytes: &[u8]) -> Result<()> {
-    match write_whole(bytes) {
+    let written = match std::str::from_utf8(bytes) {
+        Ok(text) if io::stdout().is_terminal() => write_whole(shown::lines_shown(text).as_bytes()),
+        _ => write_whole(bytes),
+    };
+    match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
             Err(Error::output(Path::new("stdout"), format!("cannot be written ({error})")))
         }
@@ -62,9 +70,10 @@ fn write_whole(bytes: &[u8]) -> io::Result<()> {
     out.flush()
 }
 
-/// Prints a line to stderr. A failure is ignored, since there is nowhere to report it.
+/// Prints a line to stderr, with control characters spelt out. A failure is ignored, since there is nowhere to report
+/// it.
 pub(crate) fn say(line: &str) {
-    let _ = writeln!(io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{}", shown(line));
 }
 
 /// The exit code for an outcome. A failure is printed.

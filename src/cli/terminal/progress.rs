@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 
-use super::say;
+use super::{say, shown};
 
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -110,7 +110,7 @@ impl Progress {
             Form::Bar(bar) => {
                 bar.set_length(1000);
                 bar.set_position((standing.share() * 1000.0) as u64);
-                bar.set_message(standing.line());
+                bar.set_message(shown(&standing.line()).into_owned());
             }
             Form::Plain => say(&standing.line()),
             Form::Json => say(&standing.json_line()),

@@ -161,6 +161,10 @@ impl Members {
         )
     }
 
+    pub fn content(&self, name: &str) -> &[u8] {
+        &self.0.iter().find(|(member, _)| member == name).expect("it is there").1
+    }
+
     pub fn without(mut self, name: &str) -> Self {
         self.0.retain(|(member, _)| member != name);
         self

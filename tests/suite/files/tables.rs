@@ -1,7 +1,7 @@
 //! Tables of flies for other programs.
 
 use serde_json::{Map, Value, json};
-use smalti::archive::{encode_csv, encode_json, read_csv_meta, read_json_meta};
+use smalti::archive::{encode_csv, encode_json, is_whole_csv, read_csv_meta, read_json_meta};
 use smalti::model::fly::Genes;
 use smalti::model::{Blend, Fly, Grout, Population};
 
@@ -30,23 +30,55 @@ fn fly_of(row: &[String]) -> (Fly, i64) {
     (fly, row[11].parse().unwrap())
 }
 
-fn assert_all_flies(rows: impl Iterator<Item = Vec<String>>) {
-    let (population, fitness) = (population(), fitness());
-    let expected: Vec<(Fly, i64)> = population.flies.into_iter().zip(fitness).collect();
+fn assert_flies(expected: Population, rows: impl Iterator<Item = Vec<String>>) {
+    let expected: Vec<(Fly, i64)> = expected.flies.into_iter().zip(fitness()).collect();
     let found: Vec<(Fly, i64)> = rows.map(|row| fly_of(&row)).collect();
     assert!(found == expected);
 }
 
+/// The population with all its flies alive.
+fn all_alive() -> Population {
+    let flies = population().flies.into_iter().map(|fly| Fly { alive: true, ..fly }).collect();
+    Population { flies, ..population() }
+}
+
 #[test]
 fn a_csv_table_has_a_line_of_names_and_a_line_per_fly_and_loses_no_bit() {
-    let csv = encode_csv(&population(), &fitness(), &meta()).unwrap();
-    assert_eq!(csv, encode_csv(&population(), &fitness(), &meta()).unwrap());
+    let csv = encode_csv(&all_alive(), &fitness(), &meta()).unwrap();
+    assert_eq!(csv, encode_csv(&all_alive(), &fitness(), &meta()).unwrap());
     let text = std::str::from_utf8(&csv).unwrap();
     assert_eq!(text.lines().count(), 501);
     assert!(text.starts_with(&names()) && text.ends_with('\n') && !text.contains(['"', '\r']));
     assert!(text.lines().skip(1).all(|line| line.ends_with(",partial,2,77,0123456789abcdef")));
     let mut reader = csv::Reader::from_reader(&csv[..]);
-    assert_all_flies(reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()));
+    assert_flies(all_alive(), reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()));
+}
+
+#[test]
+fn flies_that_do_not_live_are_in_no_csv_table_which_then_tells_how_many_do() {
+    let living: Vec<(Fly, i64)> = population().flies.into_iter().zip(fitness()).filter(|(fly, _)| fly.alive).collect();
+    assert!((1..500).contains(&living.len()));
+    let csv = encode_csv(&population(), &fitness(), &meta()).unwrap();
+    let mut reader = csv::Reader::from_reader(&csv[..]);
+    assert_eq!(reader.headers().unwrap().iter().collect::<Vec<_>>().join(","), names() + ",living");
+    let rows: Vec<Vec<String>> = reader.records().map(|row| row.unwrap().iter().map(str::to_owned).collect()).collect();
+    assert!(rows.iter().all(|row| row[17] == living.len().to_string() && row[16] == "0123456789abcdef"));
+    assert!(rows.iter().map(|row| fly_of(row)).collect::<Vec<_>>() == living);
+}
+
+#[test]
+fn a_csv_table_is_whole_to_its_last_line_and_holds_no_dead_fly() {
+    for population in [population(), all_alive()] {
+        let csv = encode_csv(&population, &fitness(), &meta()).unwrap();
+        assert!(is_whole_csv(&csv, 500));
+        let ends = csv.iter().enumerate().filter(|(_, byte)| **byte == b'\n').map(|(end, _)| end + 1);
+        for end in ends.take(499).chain([0, 1, csv.len() - 1]).filter(|&end| end < csv.len()) {
+            assert!(!is_whole_csv(&csv[..end], 500), "cut at {end} of {}", csv.len());
+        }
+    }
+    let csv = String::from_utf8(encode_csv(&all_alive(), &fitness(), &meta()).unwrap()).unwrap();
+    assert!(!is_whole_csv(csv.replacen(",true,", ",false,", 1).as_bytes(), 500), "as older versions wrote it");
+    assert!(!is_whole_csv(csv.as_bytes(), 501));
 }
 
 #[test]
@@ -72,7 +104,10 @@ fn a_json_table_is_one_object_and_loses_no_bit() {
     let spelt = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
     let flies = table["flies"].as_array().unwrap();
     assert!(flies.iter().all(|fly| fly.as_object().unwrap().len() == COLUMNS.len()));
-    assert_all_flies(flies.iter().map(|fly| COLUMNS.iter().map(|column| spelt(&fly[column])).collect()));
+    assert_flies(
+        self::population(),
+        flies.iter().map(|fly| COLUMNS.iter().map(|column| spelt(&fly[column])).collect()),
+    );
 }
 
 #[test]
@@ -80,7 +115,8 @@ fn a_table_is_known_by_how_it_begins() {
     let workshop = Workshop::new();
     let meta = json!({"key": "k", "note": "line\nbreak"}).as_object().unwrap().clone();
     workshop.write("a.json", &encode_json(&population(), &fitness(), &meta).unwrap());
-    workshop.write("a.csv", &encode_csv(&population(), &fitness(), &self::meta()).unwrap());
+    workshop.write("a.csv", &encode_csv(&all_alive(), &fitness(), &self::meta()).unwrap());
+    workshop.write("dead.csv", &encode_csv(&population(), &fitness(), &self::meta()).unwrap());
     let drawn = json!({"key": "ab".repeat(32)}).as_object().unwrap().clone();
     workshop.write("drawn.csv", &encode_csv(&population(), &fitness(), &drawn).unwrap());
     workshop.write("keyless.csv", &encode_csv(&population(), &fitness(), &Map::new()).unwrap());
@@ -95,7 +131,7 @@ fn a_table_is_known_by_how_it_begins() {
     assert!(read_json_meta(&workshop.path("missing.json")).is_err());
     let told = |name| read_csv_meta(&workshop.path(name)).unwrap().map(Value::Object);
     let of_a = json!({"key": "0123456789abcdef", "sae": 77, "restarts_made": 2, "status": "partial"});
-    assert_eq!(told("a.csv"), Some(of_a));
+    assert_eq!([told("a.csv"), told("dead.csv")], [Some(of_a.clone()), Some(of_a)]);
     let of_drawn = json!({"key": "ab".repeat(8), "sae": null, "restarts_made": null, "status": ""});
     assert_eq!(told("drawn.csv"), Some(of_drawn));
     assert_eq!(["keyless.csv", "a.json", "photo.png"].map(told), [None, None, None]);

@@ -92,6 +92,8 @@ fn told_by_same(output: &Destination, key: &str, fly_count: usize) -> Result<Opt
     }
     let is_whole = is_whole(output, fly_count);
     match story::told_by_file(output) {
+        // No row can tell the key, so the table is made anew.
+        None if is_table_without_rows(output) => Ok(None),
         // A file that ends in zeros may be ours, and have lost its metadata in a crash of the system.
         None if is_whole && !ends_in_zero(output) => Err(foreign(output)),
         None => Ok(None),
@@ -111,12 +113,21 @@ pub(super) fn check_remade(output: &Destination, bytes: &[u8], on_exists: OnExis
     if on_exists == OnExists::Overwrite || !output.path.is_file() || story::told_by_file(output).is_some() {
         return Ok(());
     }
-    if outputs::is_left_of(&output.path, bytes) { Ok(()) } else { Err(foreign(output)) }
+    if is_table_without_rows(output) || outputs::is_left_of(&output.path, bytes) {
+        Ok(())
+    } else {
+        Err(foreign(output))
+    }
 }
 
 fn foreign(output: &Destination) -> Error {
     let reason = "exists and was not made by smalti; name another folder, or replace it with --on-exists overwrite";
     Error::output(&output.path, reason)
+}
+
+/// Whether the file is a CSV table of no tile.
+fn is_table_without_rows(output: &Destination) -> bool {
+    output.content == Content::Csv && archive::is_csv_without_rows(&output.path)
 }
 
 /// Whether the file is complete to its last byte. If it was cut short, it must be made anew.
@@ -130,11 +141,7 @@ fn is_whole(output: &Destination, fly_count: usize) -> bool {
         Content::Json => {
             ends_with(b"\n") && read(output).is_some_and(|bytes| serde_json::from_slice::<IgnoredAny>(&bytes).is_ok())
         }
-        // A header line, and one line for each fly.
-        Content::Csv => read(output).is_some_and(|bytes| {
-            let lines = bytes.iter().filter(|&&byte| byte == b'\n').count();
-            bytes.ends_with(b"\n") && lines == fly_count + 1 && !bytes.contains(&0)
-        }),
+        Content::Csv => read(output).is_some_and(|bytes| archive::is_whole_csv(&bytes, fly_count)),
     }
 }
 

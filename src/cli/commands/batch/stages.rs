@@ -1,6 +1,5 @@
 //! The forms of a picture at each stage of a batch, and what all threads share.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Sender, SyncSender};
 
 use rayon::ThreadPool;
@@ -18,6 +17,7 @@ use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::trace::Tracer;
 use crate::error::{Error, Result};
 use crate::evolve::Ending;
+use crate::guard;
 use crate::output;
 use crate::studio::{Device, Drawn};
 
@@ -143,10 +143,11 @@ pub(super) fn tell(reports: &Sender<Report>, row: Row) {
     let _ = reports.send(Report::Row(Box::new(row)));
 }
 
-/// Does some work on a picture. A panic becomes an error, since one picture must not end a batch.
+/// Does some work on a picture. A panic becomes an error, since one picture must not end a batch. What a decoder makes
+/// of a broken file was caught before (`guard.rs`), so this one is a bug.
 pub(super) fn unless_it_panics<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
-        let told = panic.downcast_ref::<&str>().map(ToString::to_string).or(panic.downcast_ref::<String>().cloned());
-        Err(Error::Internal(format!("a picture made the program panic: {}", told.unwrap_or_default())))
+    guard::caught(work).unwrap_or_else(|panicked| {
+        let place = &panicked.place;
+        Err(Error::Internal(format!("a picture made the program panic at {place}: {panicked}")))
     })
 }

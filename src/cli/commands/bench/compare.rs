@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::Figures;
 use super::table::{aligned, head, value};
+use super::{Figures, Machine};
 use crate::error::{Error, Result};
 use crate::photo::why_unreadable;
 
@@ -31,6 +31,12 @@ pub(super) fn read(path: &Path) -> Result<Figures> {
     if figures.schema_version != Figures::SCHEMA_VERSION {
         let version = figures.schema_version;
         return Err(Error::input(path, format!("is a result of schema {version}, which this smalti does not know")));
+    }
+    let Machine { os, architecture, device, driver, .. } = &figures.machine;
+    let names = figures.measurements.iter().map(|row| &row.name).chain([&figures.version, os, architecture, device]);
+    // A line break in a name could pass for a line of the table.
+    if names.chain(driver).any(|name| name.contains(char::is_control)) {
+        return Err(Error::input(path, foreign));
     }
     if figures.measurements.iter().any(|row| !(row.value.is_finite() && row.value > 0.0)) {
         return Err(Error::input(path, "holds a value that is not above 0; measure again"));

@@ -5,7 +5,7 @@ mod table;
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -200,7 +200,7 @@ fn check_output(args: &MergeArgs, files: &[PathBuf]) -> Result<()> {
 /// Whether a file is empty, or begins like a file of rows in one of the formats.
 fn holds_rows(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
-    let first = BufReader::new(file).lines().next();
+    let first = BufReader::new(file.take(rows::ROW_BYTES_MAX)).lines().next();
     first.is_none_or(|line| line.is_ok_and(|line| table::is_heading(&line) || rows::is_row(&line)))
 }
 

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Map, Value};
 
 use crate::cli::list::rows::ResultRow;
+use crate::cli::values::table_cell;
 use crate::error::{Error, Result};
 
 /// The fields of a row, in order.
@@ -61,10 +62,15 @@ pub(super) fn is_heading(line: &str) -> bool {
 fn cell(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
-        Value::String(text) => text.clone(),
-        Value::Array(parts) => parts.iter().map(cell).collect::<Vec<_>>().join(";"),
+        Value::String(text) => table_cell(text).into_owned(),
+        Value::Array(parts) => table_cell(&parts.iter().map(part).collect::<Vec<_>>().join(";")).into_owned(),
         other => other.to_string(),
     }
+}
+
+/// One of several values in a cell.
+fn part(value: &Value) -> String {
+    value.as_str().map_or_else(|| cell(value), str::to_owned)
 }
 
 /// What one shard did.
@@ -149,6 +155,16 @@ mod tests {
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], COLUMNS.join(","));
         assert_eq!(lines[1], r#""a, b",,complete,,x.png;x.npz,,,,,,34.5,,,,,,,,,,,,,,,,"no ""x""""#);
+    }
+
+    #[test]
+    fn a_cell_that_would_be_a_formula_is_text_and_a_number_stays_one() {
+        let line =
+            r#"{"id":"=HYPERLINK(\"x\")","status":"complete","output":["@x.png","=y"],"objective":-5,"error":"+1;a"}"#;
+        let csv = String::from_utf8(csv(&[row(line, "r.jsonl")]).expect("rows are CSV")).expect("and text");
+        let cells = csv.lines().nth(1).expect("there is a row");
+        assert!(cells.starts_with(r#""'=HYPERLINK(""x"")",,complete,,'@x.png;=y,"#), "{cells}");
+        assert!(cells.contains(",-5,") && cells.ends_with(",'+1;a"), "{cells}");
     }
 
     #[test]

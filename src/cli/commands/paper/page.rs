@@ -2,6 +2,8 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use crate::cli::values::table_cell;
+
 /// The text that marks a page as ours.
 pub(super) const GENERATOR: &str = "smalti paper";
 
@@ -83,7 +85,9 @@ impl FigureTable {
     pub(super) fn to_csv(&self) -> Vec<u8> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         for row in std::iter::once(&self.head).chain(&self.rows) {
-            writer.write_record(row).expect("rows are as long as the head, and memory takes all");
+            writer
+                .write_record(row.iter().map(|text| table_cell(text).into_owned()))
+                .expect("rows are as long as the head, and memory takes all");
         }
         writer.into_inner().expect("memory takes all")
     }
@@ -206,5 +210,7 @@ mod tests {
         );
         let table = FigureTable { head: vec!["a".to_owned()], rows: vec![vec!["1,\"2".to_owned()]], file: None };
         assert_eq!(table.to_csv(), b"a\n\"1,\"\"2\"\n");
+        let rows = [["=1+1"], ["-1.5"]].map(|row| row.map(str::to_owned).to_vec()).to_vec();
+        assert_eq!(FigureTable { head: vec!["@a".to_owned()], rows, file: None }.to_csv(), b"'@a\n'=1+1\n-1.5\n");
     }
 }

@@ -1,7 +1,8 @@
 //! The files of a plan. Decides which files in its folder belong to a plan and may be replaced.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::{self, File};
+use std::io::Read;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -13,6 +14,8 @@ use crate::output;
 
 /// The file that lists the others.
 const LIST: &str = "plan.json";
+/// Most bytes of that file; a plan has a few hundred files at most.
+const LIST_BYTES_MAX: u64 = 1 << 26;
 
 /// What a plan remembers about its files.
 #[derive(Debug, Default, Deserialize, Serialize)]
@@ -57,7 +60,11 @@ pub(super) fn write(folder: &Path, files: &BTreeMap<String, String>, overwrite: 
 
 fn old_list(folder: &Path, overwrite: Overwrite) -> Result<List> {
     let path = folder.join(LIST);
-    let Ok(bytes) = fs::read(&path) else { return Ok(List::default()) };
+    let mut bytes = Vec::new();
+    let read = File::open(&path).and_then(|file| file.take(LIST_BYTES_MAX).read_to_end(&mut bytes));
+    if read.is_err() {
+        return Ok(List::default());
+    }
     match serde_json::from_slice(&bytes) {
         Ok(list) => Ok(list),
         Err(_) if overwrite == Overwrite::Force => Ok(List::default()),

@@ -95,6 +95,7 @@ fn table(rows: &[FlickerRow]) -> String {
     let mut text = format!("{:>8}  {:>6}  {:>8}  {:>12}  {:>8}  file\n", "FLICKER", "STILL", "CHANGE", "SAE", "MAE");
     for FlickerRow { file, flicker, still, change, sae, mae, .. } in rows {
         let [flicker, still, change] = [*flicker, *still, *change].map(figure);
+        let file = terminal::shown(file);
         text += &format!("{flicker:>8}  {still:>6}  {change:>8}  {sae:>12}  {mae:>8.4}  {file}\n");
     }
     text

@@ -199,7 +199,7 @@ fn table(rows: &[ScoreRow]) -> String {
         std::array::from_fn(|column| lines.iter().map(|(cells, _)| cells[column].len()).max().unwrap_or_default());
     let line = |(cells, file): &([String; 8], &str)| {
         let figures: String = cells.iter().zip(widths).map(|(cell, width)| format!("{cell:>width$}  ")).collect();
-        format!("{figures}{file}\n")
+        format!("{figures}{}\n", terminal::shown(file))
     };
     lines.iter().map(line).collect()
 }

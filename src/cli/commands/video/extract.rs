@@ -35,6 +35,8 @@ pub(super) struct Frames {
 
 /// The name of the [`Index`].
 const INDEX: &str = "video.json";
+/// Most bytes of it; a frame takes about a hundred.
+const INDEX_BYTES_MAX: u64 = 1 << 28;
 /// Bytes that are read at a time to be hashed.
 const CHUNK_BYTES: usize = 1 << 16;
 
@@ -123,8 +125,10 @@ impl Kept<'_> {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Stale(Vec::new())),
             names => names.map_err(|error| self.unusable(&error))?,
         };
-        let index = fs::read(self.folder.join(INDEX)).ok();
-        let index = index.and_then(|text| serde_json::from_slice::<Index>(&text).ok());
+        let mut text = Vec::new();
+        let read =
+            File::open(self.folder.join(INDEX)).and_then(|file| file.take(INDEX_BYTES_MAX).read_to_end(&mut text));
+        let index = read.ok().and_then(|_| serde_json::from_slice::<Index>(&text).ok());
         let index = index.filter(|index| index.software == SOFTWARE);
         let listed = index.iter().flat_map(|index| index.frames.iter().map(|entry| entry.name.as_str()));
         let ours: HashSet<&str> = listed.chain(index.iter().map(|_| INDEX)).collect();

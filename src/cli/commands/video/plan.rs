@@ -196,7 +196,11 @@ pub(super) fn print_shots(planned: &[Planned], is_json: bool) -> Result<()> {
             Begin::Cut => "cut",
             Begin::Keyframe => "keyframe",
         };
-        text += &format!("{frames:>17}  {:>7}  {begins:8}  {difference:>10}  {input}\n", HumanCount(*count as u64));
+        text += &format!(
+            "{frames:>17}  {:>7}  {begins:8}  {difference:>10}  {}\n",
+            HumanCount(*count as u64),
+            terminal::shown(input)
+        );
     }
     terminal::write_stdout(text.as_bytes())
 }
