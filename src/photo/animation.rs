@@ -16,7 +16,6 @@ use png::{BlendOp, DeflateCompression};
 
 use super::metadata::Metadata;
 use super::palette::{COLOR_COUNT_MAX, nearest, palette_of};
-use crate::model::Mosaic;
 
 /// Most frames a second of a GIF: viewers show shorter delays as a tenth of a second.
 pub const GIF_FRAMES_PER_S_MAX: u16 = 50;
@@ -58,7 +57,7 @@ pub struct Frames {
     pub size_px: (u32, u32),
     /// When they are shown.
     pub timing: Timing,
-    /// Whether they may be transparent. If not, a frame with alpha is shown over black.
+    /// Whether they may be transparent.
     pub has_alpha: bool,
 }
 
@@ -68,11 +67,11 @@ type Rgba = [u8; 4];
 /// The least opacity of a pixel that a GIF shows.
 const GIF_ALPHA_MIN: u8 = 128;
 
-/// The pixels of a frame, all of them opaque unless `has_alpha`.
-fn rgba(frame: &Mosaic, has_alpha: bool) -> Vec<Rgba> {
-    match frame.alpha.as_ref().filter(|_| has_alpha) {
-        Some(alpha) => frame.pixels.iter().zip(alpha).map(|(&[r, g, b], &a)| [r, g, b, a]).collect(),
-        None => frame.over_black().iter().map(|&[r, g, b]| [r, g, b, 255]).collect(),
+/// The pixels of a frame, with their opacities if it has any.
+fn rgba(pixels: &[[u8; 3]], alpha: Option<&[u8]>) -> Vec<Rgba> {
+    match alpha {
+        Some(alpha) => pixels.iter().zip(alpha).map(|(&[r, g, b], &a)| [r, g, b, a]).collect(),
+        None => pixels.iter().map(|&[r, g, b]| [r, g, b, 255]).collect(),
     }
 }
 
@@ -173,13 +172,13 @@ impl<W: Write> ApngEncoder<W> {
         Ok(Self { writer: encoder.write_header()?, screen: Screen::new(size_px.0), frames, next: 0 })
     }
 
-    /// Adds the next frame.
+    /// Adds the next frame, row by row from the top, with its opacities if frames may be transparent.
     ///
     /// # Errors
     /// If it cannot be written, or if it is one frame too many.
-    pub fn add(&mut self, frame: &Mosaic) -> io::Result<()> {
+    pub fn add(&mut self, pixels: &[[u8; 3]], alpha: Option<&[u8]>) -> io::Result<()> {
         let Frames { timing, has_alpha, .. } = self.frames;
-        let frame = rgba(frame, has_alpha);
+        let frame = rgba(pixels, alpha);
         let Changes { area, pixels } = self.screen.show(&frame);
         if self.next > 0 {
             // The encoder checks that the frame lies within the picture after each call; in this order it always does.
@@ -240,13 +239,13 @@ impl<W: Write> GifEncoder<W> {
         Ok(Self { encoder, screen: Screen::new(size_px.0), frames, next: 0 })
     }
 
-    /// Adds the next frame.
+    /// Adds the next frame, row by row from the top, with its opacities if frames may be transparent.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn add(&mut self, frame: &Mosaic) -> io::Result<()> {
+    pub fn add(&mut self, pixels: &[[u8; 3]], alpha: Option<&[u8]>) -> io::Result<()> {
         let Frames { timing, has_alpha, .. } = self.frames;
-        let frame = rgba(frame, has_alpha);
+        let frame = rgba(pixels, alpha);
         let Changes { area, pixels } = if has_alpha { self.screen.solid(&frame) } else { self.screen.show(&frame) };
         let changed: Vec<[u8; 3]> = pixels.iter().flatten().map(|&[r, g, b, _]| [r, g, b]).collect();
         let palette = match changed.len() {
@@ -336,15 +335,14 @@ mod tests {
     #[test]
     fn frames_that_are_missing_or_too_many_are_errors() {
         let frames = Frames { size_px: (1, 1), timing: timing(2, 20), has_alpha: false };
-        let frame = Mosaic { width_px: 1, height_px: 1, pixels: vec![[1; 3]], alpha: None };
         let mut out = Vec::new();
         let mut encoder = ApngEncoder::new(&mut out, frames, &Vec::new()).expect("it begins");
-        encoder.add(&frame).expect("the first frame");
-        encoder.add(&frame).expect("the second frame");
-        assert!(encoder.add(&frame).is_err());
+        encoder.add(&[[1; 3]], None).expect("the first frame");
+        encoder.add(&[[1; 3]], None).expect("the second frame");
+        assert!(encoder.add(&[[1; 3]], None).is_err());
         let mut out = Vec::new();
         let mut encoder = ApngEncoder::new(&mut out, frames, &Vec::new()).expect("it begins");
-        encoder.add(&frame).expect("the first frame");
+        encoder.add(&[[1; 3]], None).expect("the first frame");
         assert!(encoder.finish().is_err());
     }
 }

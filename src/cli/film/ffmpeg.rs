@@ -170,7 +170,8 @@ fn not_started(path: &Path, error: &io::Error) -> Error {
     Error::output(path, format!("{reason}, or write .png or .gif"))
 }
 
-/// The frame with even sides, as 4:2:0 needs them, over black where it is transparent. An odd side gets its last column or row twice.
+/// The frame with even sides, as 4:2:0 needs them, over black where it is transparent. An odd side gets its last column
+/// or row twice.
 fn even(frame: &Mosaic) -> Vec<u8> {
     let width_px = frame.width_px as usize;
     let pixels = frame.over_black();

@@ -6,6 +6,7 @@ mod file;
 mod provenance;
 mod shooting;
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, BufWriter};
 
@@ -31,6 +32,7 @@ pub(crate) struct Film {
     encoder: Encoder,
     // Must come after the encoder, which may still write to it when dropped.
     file: PartialFile,
+    has_alpha: bool,
 }
 
 enum Encoder {
@@ -56,7 +58,7 @@ impl Film {
             AnimationFormat::Mp4 => Encoder::Ffmpeg(ffmpeg(Codec::H264)?),
             AnimationFormat::WebM => Encoder::Ffmpeg(ffmpeg(Codec::Vp9)?),
         };
-        Ok(Self { encoder, file })
+        Ok(Self { encoder, file, has_alpha: frames.has_alpha })
     }
 
     /// Adds the next frame.
@@ -65,9 +67,11 @@ impl Film {
     /// [`Error::Output`].
     pub(crate) fn add(&mut self, frame: &Mosaic) -> Result<()> {
         let failed = |error: io::Error| self.file.failure(&error);
+        let alpha = frame.alpha.as_deref().filter(|_| self.has_alpha);
+        let pixels = if alpha.is_some() { Cow::Borrowed(&frame.pixels[..]) } else { frame.over_black() };
         match &mut self.encoder {
-            Encoder::Apng(encoder) => encoder.add(frame).map_err(failed),
-            Encoder::Gif(encoder) => encoder.add(frame).map_err(failed),
+            Encoder::Apng(encoder) => encoder.add(&pixels, alpha).map_err(failed),
+            Encoder::Gif(encoder) => encoder.add(&pixels, alpha).map_err(failed),
             Encoder::Ffmpeg(ffmpeg) => ffmpeg.add(frame),
         }
     }
@@ -77,7 +81,7 @@ impl Film {
     /// # Errors
     /// [`Error::Output`].
     pub(crate) fn finish(self) -> Result<PartialFile> {
-        let Self { encoder, file } = self;
+        let Self { encoder, file, .. } = self;
         let finished: Result<(), Error> = match encoder {
             Encoder::Apng(encoder) => encoder.finish().map_err(|error| file.failure(&error)),
             Encoder::Gif(encoder) => encoder.finish().map_err(|error| file.failure(&error)),
