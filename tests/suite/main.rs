@@ -29,6 +29,7 @@ mod lanes_vulkan;
 mod layering;
 mod layout;
 mod looks;
+mod machines;
 mod paper;
 mod paper_lanes;
 mod reference;

@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use crate::cli::files::destination::Overwrite;
+use crate::cli::files::destination::{self, Overwrite};
 use crate::cli::files::sheet::sheet;
 use crate::cli::mosaics::{Made, MosaicsArgs, PaperRecipe, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;
@@ -61,11 +61,11 @@ pub(crate) fn make(args: &GalleryArgs) -> ExitCode {
 }
 
 fn try_make(args: &GalleryArgs) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
     let page = args.output.join("README.md");
     check_folder(&args.output, &page, args.mosaics.overwrite())?;
     let verbosity = args.mosaics.verbosity();
     let targets = args.inputs.iter().map(|path| read(path, verbosity)).collect::<Result<Vec<_>>>()?;
+    let interrupt = Interrupt::listen()?;
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
     output::check_writable(&page)?;
@@ -93,6 +93,9 @@ fn try_make(args: &GalleryArgs) -> Result<()> {
 fn check_folder(folder: &Path, page: &Path, overwrite: Overwrite) -> Result<()> {
     if folder.is_file() {
         return Err(Error::Usage(format!("{} is a file; name a folder", folder.display())));
+    }
+    if folder.is_dir() {
+        destination::sweep(folder)?;
     }
     let is_gallery = std::fs::read(page).is_ok_and(|bytes| bytes.starts_with(TITLE.as_bytes()));
     let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());

@@ -242,6 +242,7 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
     let began = Instant::now();
     let files = outputs::encode(&options.outputs.iter().collect::<Vec<_>>(), &drawn, &provenances.told(&meta))?;
     // Before this point an interrupt leaves no files.
+    destination::sweep_beside(options.outputs.iter().map(|output| output.path.as_path()));
     outputs::write(&files, &Interrupt::listen()?, &mut row.output)?;
     row.save_ms = terminal::milliseconds(began.elapsed());
     row.status = Status::Complete;

@@ -1,5 +1,6 @@
 //! Where results go: what a path's ending asks for, and whether the path may be written to.
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::io::IsTerminal;
 use std::path::{Component, Path, PathBuf};
@@ -185,6 +186,16 @@ fn stdout_is_closed() -> bool {
 /// As [`output::sweep`].
 pub(crate) fn sweep(folder: &Path) -> Result<()> {
     output::sweep(folder, |found| found.modified().ok()?.elapsed().ok())
+}
+
+/// Removes what killed processes left beside files that are about to be written. A failure is ignored: we may be allowed
+/// to write a file in a folder but not to list it.
+pub(crate) fn sweep_beside<'a>(files: impl Iterator<Item = &'a Path>) {
+    let folder = |file: &'a Path| file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folders: BTreeSet<&Path> = files.map(|file| folder(file).unwrap_or(Path::new("."))).collect();
+    for folder in folders {
+        let _ = sweep(folder);
+    }
 }
 
 /// Whether one of these files lies at `place`.

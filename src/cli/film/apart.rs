@@ -10,6 +10,7 @@ use std::time::Duration;
 use crate::cli::files::child::in_its_own_group;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
+use crate::threads;
 
 /// Time between two looks at whether a process has ended, or must be ended.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
@@ -70,7 +71,8 @@ fn run(command: &mut Command, video: &Path, interrupt: &Interrupt) -> Result<Vec
     };
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = Running(in_its_own_group(command).spawn().map_err(unusable)?);
-    let (stdout, stderr) = (child.0.stdout.take().map(read_all), child.0.stderr.take().map(read_all));
+    let stdout = child.0.stdout.take().map(read_all).transpose()?;
+    let stderr = child.0.stderr.take().map(read_all).transpose()?;
     let status = loop {
         interrupt.check()?;
         match child.0.try_wait().map_err(unusable)? {
@@ -89,8 +91,8 @@ fn run(command: &mut Command, video: &Path, interrupt: &Interrupt) -> Result<Vec
 }
 
 /// Reads a pipe to its end, since a full pipe would block its writer.
-fn read_all(mut pipe: impl Read + Send + 'static) -> JoinHandle<Vec<u8>> {
-    std::thread::spawn(move || {
+fn read_all(mut pipe: impl Read + Send + 'static) -> Result<JoinHandle<Vec<u8>>> {
+    threads::spawn("ffmpeg", move || {
         let mut bytes = Vec::new();
         // What was read before a failure may tell its reason.
         let _ = pipe.read_to_end(&mut bytes);

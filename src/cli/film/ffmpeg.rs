@@ -11,6 +11,7 @@ use crate::cli::files::child::in_its_own_group;
 use crate::error::{Error, Result};
 use crate::model::Mosaic;
 use crate::photo::Timing;
+use crate::threads;
 
 /// The program, which the system finds in the user's `PATH`.
 const PROGRAM: &str = "ffmpeg";
@@ -103,16 +104,14 @@ impl Ffmpeg {
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
         let mut child = in_its_own_group(&mut command).spawn().map_err(|error| not_started(&output.path, &error))?;
-        let complaint = child.stderr.take().map(|stderr| std::thread::spawn(move || last_line(BufReader::new(stderr))));
+        let (frames, stderr) = (child.stdin.take(), child.stderr.take());
         let hold_frames = (u32::from(timing.last_cs) * u32::from(timing.frames_per_s)).div_ceil(100);
-        Ok(Self {
-            path: output.path.clone(),
-            frames: child.stdin.take(),
-            child,
-            complaint,
-            last: Vec::new(),
-            hold_frames,
-        })
+        let mut ffmpeg =
+            Self { path: output.path.clone(), frames, child, complaint: None, last: Vec::new(), hold_frames };
+        // If no thread can be started, the process is ended.
+        let read = |stderr| threads::spawn("ffmpeg", move || last_line(BufReader::new(stderr)));
+        ffmpeg.complaint = stderr.map(read).transpose()?;
+        Ok(ffmpeg)
     }
 
     /// Adds the next frame.

@@ -14,7 +14,7 @@ use crate::cli::files::snapshots::SaveRun;
 use crate::error::{Error, Result};
 use crate::evolve::{Seen, Stage};
 use crate::model::{Fly, Population};
-use crate::{archive, output};
+use crate::{archive, output, threads};
 
 /// How many snapshots may wait to be written.
 const QUEUE_LENGTH: usize = 2;
@@ -65,7 +65,7 @@ impl Recorder {
         save_run.prepare(told.get("key").and_then(Value::as_str).unwrap_or_default())?;
         let (queue, passed) = sync_channel::<Passed>(QUEUE_LENGTH);
         let writing = save_run.clone();
-        let writer = std::thread::Builder::new().name("snapshots".to_owned()).spawn(move || {
+        let writer = threads::spawn("snapshots", move || {
             let (mut population, mut made) = (stage, Vec::new());
             let written = passed.into_iter().try_for_each(|passed| {
                 let path = writing.path_of(passed.evals);
@@ -76,9 +76,6 @@ impl Recorder {
             });
             written.map_err(|error| make_room(&writing.folder, &made, error))
         });
-        let writer = writer.map_err(|error| {
-            Error::output(&save_run.folder, format!("no thread can be started to write to it ({error})"))
-        })?;
         Ok(Self {
             save_run: save_run.clone(),
             every: save_run.evals_between(evals_planned),
@@ -86,7 +83,7 @@ impl Recorder {
             last: None,
             run: 0,
             queue: Some(queue),
-            writer: Some(writer),
+            writer: Some(writer?),
             written: Ok(()),
         })
     }

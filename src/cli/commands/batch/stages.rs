@@ -1,6 +1,5 @@
 //! The forms of a picture at each stage of a batch, and what all threads share.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Sender, SyncSender};
 
 use rayon::ThreadPool;
@@ -14,9 +13,10 @@ use crate::cli::jobs::row::Row;
 use crate::cli::jobs::watch::Watchers;
 use crate::cli::list::shard::Shard;
 use crate::cli::list::{IoThreads, Item, OnExists};
+use crate::cli::terminal::aside::unless_it_panics;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::trace::Tracer;
-use crate::error::{Error, Result};
+use crate::error::Error;
 use crate::evolve::Ending;
 use crate::output;
 use crate::studio::{Device, Drawn};
@@ -141,12 +141,4 @@ impl<'a> Pipeline<'a> {
 /// Reports the row of a picture. The send cannot fail: the receiver listens until the last sender is gone.
 pub(super) fn tell(reports: &Sender<Report>, row: Row) {
     let _ = reports.send(Report::Row(Box::new(row)));
-}
-
-/// Does some work on a picture. A panic becomes an error, since one picture must not end a batch.
-pub(super) fn unless_it_panics<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
-        let told = panic.downcast_ref::<&str>().map(ToString::to_string).or(panic.downcast_ref::<String>().cloned());
-        Err(Error::Internal(format!("a picture made the program panic: {}", told.unwrap_or_default())))
-    })
 }

@@ -3,7 +3,7 @@
 mod options;
 mod summary;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -20,7 +20,7 @@ use crate::cli::jobs::recorder::Recorder;
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::jobs::watch::Watchers;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::cli::terminal::{self, Verbosity, advice};
+use crate::cli::terminal::{self, Verbosity, advice, aside};
 use crate::cli::trace::{self, Capture, CaptureRange, TraceArgs};
 use crate::error::Result;
 use crate::evolve::Ending;
@@ -91,7 +91,12 @@ impl Run<'_> {
         let capture = capture.map(|range| trace::begin_capture(range, &device)).transpose()?;
         row.device = Some(device.label().to_owned());
 
-        let prepared = Prepared::load(picture, &row.id)?;
+        // Before there is anything to save, a signal ends this at once.
+        let load = {
+            let (picture, id) = (picture.clone(), row.id.clone());
+            move || Prepared::load(&picture, &id)
+        };
+        let prepared = aside::unless_interrupted(interrupt, load)?;
         row.note_prepared(&prepared, picture);
         let memory_bytes = prepared.check(picture)?;
         memory::check(memory_bytes)?;
@@ -107,6 +112,8 @@ impl Run<'_> {
             return Ok(());
         }
 
+        let folders = files.save_run.iter().map(|save_run| save_run.path_of(0)).collect::<Vec<_>>();
+        destination::sweep_beside(options.files_written().chain(folders.iter().map(PathBuf::as_path)));
         let mut watchers = Watchers { interrupt, recorder: begin_record(files, &prepared)? };
         let keep = if files.curves.is_empty() { Keep::Nothing } else { Keep::Curve };
         let evolved = row.note_evolution(prepared.evolve(picture, &device, &mut watchers, keep))?;

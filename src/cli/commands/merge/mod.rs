@@ -15,6 +15,7 @@ use crate::cli::files::destination;
 use crate::cli::list;
 use crate::cli::list::rows::{self, ResultRow, Rows};
 use crate::cli::terminal;
+use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -91,7 +92,8 @@ fn merge_all(args: &MergeArgs) -> Result<ExitCode> {
     if is_stdout(&args.output) {
         terminal::write_stdout(&bytes)?;
     } else {
-        output::write_atomically(&args.output, &bytes)?;
+        destination::sweep_beside(std::iter::once(args.output.as_path()));
+        Interrupt::listen()?.while_writing(|| output::write_atomically(&args.output, &bytes))?;
     }
     if !args.quiet {
         table::summary(&rows).iter().for_each(|line| terminal::say(line));

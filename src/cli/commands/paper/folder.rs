@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::page::{GENERATOR, Page};
-use crate::cli::files::destination::Overwrite;
+use crate::cli::files::destination::{self, Overwrite};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
 use crate::output;
@@ -30,6 +30,9 @@ impl<'a> Folder<'a> {
     pub(super) fn open(root: &Path, overwrite: Overwrite, interrupt: &'a Interrupt) -> Result<Self> {
         if root.is_file() {
             return Err(Error::Usage(format!("{} is a file; name a folder", root.display())));
+        }
+        if root.is_dir() {
+            destination::sweep(root)?;
         }
         if overwrite == Overwrite::Refuse && root.is_dir() && !is_empty_or_ours(root)? {
             return Err(Error::Usage(format!(

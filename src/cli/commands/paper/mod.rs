@@ -110,7 +110,6 @@ pub(crate) fn make(args: &PaperArgs) -> ExitCode {
 }
 
 fn try_make(args: &PaperArgs) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
     let verbosity = args.mosaics.verbosity();
     let images = match &args.images {
         None if args.name.needs_pictures() => {
@@ -119,6 +118,7 @@ fn try_make(args: &PaperArgs) -> Result<()> {
         Some(folder) if args.name.needs_pictures() => pictures::in_folder(folder, verbosity)?,
         _ => Vec::new(),
     };
+    let interrupt = Interrupt::listen()?;
     let folder = Folder::open(&args.output, args.mosaics.overwrite(), &interrupt)?;
     let device = args.mosaics.computing.begin(verbosity)?;
     let began = Instant::now();

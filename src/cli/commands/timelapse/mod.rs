@@ -10,6 +10,7 @@ use std::process::ExitCode;
 pub(crate) use self::options::TimelapseArgs;
 use self::options::TimelapseOptions;
 use crate::archive;
+use crate::cli::files::destination;
 use crate::cli::files::snapshots::{self, Snapshot};
 use crate::cli::film::{self, Camera, End, Film, Shown};
 use crate::cli::terminal::interrupt::{EXIT_INTERRUPTED, Interrupt};
@@ -35,13 +36,13 @@ pub(crate) fn make(args: &TimelapseArgs) -> ExitCode {
 
 /// The work, in order: check, open every output, draw and encode, give the files their names.
 fn animate(options: &TimelapseOptions) -> Result<End> {
-    let interrupt = Interrupt::listen()?;
     options.computing.start_threads()?;
     let snapshots = snapshots::list(&options.folder)?;
     let chosen = frames::choose(&snapshots, options.spacing, options.frame_count);
     let snapshots: Vec<&Snapshot> = chosen.into_iter().map(|index| &snapshots[index]).collect();
     film::check_writable(&options.outputs)?;
     let first = archive::read(&snapshots[0].path)?.population;
+    let interrupt = Interrupt::listen()?;
     let shown =
         Shown { long_side_px: options.long_side_px, background: options.background, film_count: options.outputs.len() };
     let mut camera = Camera::open(shown, &options.computing.select()?, &first)?;
@@ -50,6 +51,7 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
     for output in &options.outputs {
         film::check_replaceable(&output.path, &provenance.key, options.overwrite)?;
     }
+    destination::sweep_beside(options.outputs.iter().map(|output| output.path.as_path()));
     let open = |output| Film::open(output, &camera.canvas, timing, &provenance);
     let films = options.outputs.iter().map(open).collect::<Result<Vec<_>>>()?;
 

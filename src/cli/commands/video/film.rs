@@ -8,6 +8,7 @@ use super::options::VideoOptions;
 use super::plan::Planned;
 use super::store::Store;
 use crate::archive;
+use crate::cli::files::destination;
 use crate::cli::film::{self, AnimationProvenance, Camera, End, Film, Shown};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::Progress;
@@ -73,6 +74,7 @@ pub(super) fn make(
     let last_cs = 100 / frames_per_s;
     let timing = Timing { frame_count: planned.len() as u32, frames_per_s, last_cs, plays: 0 };
     let provenance = provenance(options, sequence);
+    destination::sweep_beside(options.films.iter().map(|output| output.path.as_path()));
     let open = |output| Film::open(output, &camera.canvas, timing, &provenance);
     let films = options.films.iter().map(open).collect::<Result<Vec<_>>>()?;
     let (end, films) = film::shoot(films, &paths, &mut camera, interrupt, Progress::new(options.progress))?;

@@ -93,7 +93,7 @@ fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> R
     totals.frames_planned = planned.len();
     totals.shots = planned.chunk_by(|one, other| one.shot == other.shot).count();
 
-    let mut shooter = Shooter::open(options, &planned, &store, &device)?;
+    let mut shooter = Shooter::open(options, &planned, &store, &device, &interrupt)?;
     let mut watcher = Watcher::begin(&interrupt, Progress::new(options.progress), planned.len());
     let made = planned.iter().try_for_each(|frame| {
         interrupt.check()?;
