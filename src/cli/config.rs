@@ -12,6 +12,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 use toml::{Table, Value};
 
+use crate::cli::files::guard;
 use crate::error::{Error, Result};
 use crate::photo;
 
@@ -43,6 +44,7 @@ struct File<'a> {
 
 impl<'a> File<'a> {
     fn read(path: &'a Path) -> Result<Self> {
+        guard::note_flags_read(path);
         let text = std::fs::read_to_string(path).map_err(|error| Error::input(path, photo::why_unreadable(&error)))?;
         let table = text.parse().map_err(|error: toml::de::Error| {
             let error = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");

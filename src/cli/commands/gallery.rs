@@ -10,6 +10,7 @@ use std::time::Instant;
 use clap::Args;
 
 use crate::cli::files::destination::{self, Overwrite};
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::sheet::sheet;
 use crate::cli::mosaics::{Made, MosaicsArgs, PaperRecipe, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;
@@ -63,6 +64,9 @@ pub(crate) fn make(args: &GalleryArgs) -> ExitCode {
 fn try_make(args: &GalleryArgs) -> Result<()> {
     let page = args.output.join("README.md");
     check_folder(&args.output, &page, args.mosaics.overwrite())?;
+    let written: Vec<PathBuf> = Shader::ALL.iter().map(|&shader| args.output.join(file_of(shader))).collect();
+    let written = written.iter().chain([&page]).map(PathBuf::as_path);
+    Inputs::new(args.inputs.iter().map(PathBuf::as_path)).refuse(written)?;
     let verbosity = args.mosaics.verbosity();
     let targets = args.inputs.iter().map(|path| read(path, verbosity)).collect::<Result<Vec<_>>>()?;
     let interrupt = Interrupt::listen()?;

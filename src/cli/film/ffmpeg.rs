@@ -92,7 +92,16 @@ impl Ffmpeg {
         let mut command = Command::new(PROGRAM);
         command
             .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y"])
-            .args(["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &format!("{width_px}x{height_px}")])
+            .args([
+                "-protocol_whitelist",
+                "pipe",
+                "-f",
+                "rawvideo",
+                "-pix_fmt",
+                "rgb24",
+                "-s",
+                &format!("{width_px}x{height_px}"),
+            ])
             .args(["-r", &timing.frames_per_s.to_string(), "-i", "pipe:0", "-an"])
             // Named explicitly, since players otherwise guess the colour matrix from the size.
             .args(["-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"])

@@ -12,6 +12,7 @@ use self::options::{EvolveOptions, Files, Mode};
 use crate::cli::args::computing;
 use crate::cli::files::curve_file::{self, CurveFile, EndedCurve};
 use crate::cli::files::destination::{self, Destination};
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::outputs::{self, EncodedFile};
 use crate::cli::files::{memory, replacing};
 use crate::cli::jobs::options::PictureOptions;
@@ -62,11 +63,13 @@ impl Run<'_> {
     fn evolve_traced(mut self, trace_args: &TraceArgs) -> Result<()> {
         let options = &mut self.options;
         if let (Some(path), Mode::Work) = (&trace_args.trace, options.mode) {
-            let taken = options.files_written().chain(options.picture.settings.init_file());
-            let taken: Vec<&Path> = taken.chain(options.picture.picture_inputs()).collect();
+            let taken: Vec<&Path> = options.files_written().chain(options.picture.files_read()).collect();
             options.picture.tracer = trace::begin_trace(path, &taken, options.files.overwrite)?;
         }
-        self.evolve(trace_args.capture)?;
+        if let failure @ Err(_) = self.evolve(trace_args.capture) {
+            self.options.picture.tracer.discard();
+            return failure;
+        }
         let Self { options: EvolveOptions { picture, .. }, interrupt, row } = self;
         let Some(path) = trace_args.trace.as_ref().filter(|_| picture.tracer.is_on()) else { return Ok(()) };
         let events = interrupt.while_writing(|| picture.tracer.finish())?;
@@ -118,10 +121,11 @@ impl Run<'_> {
         let keep = if files.curves.is_empty() { Keep::Nothing } else { Keep::Curve };
         let evolved = row.note_evolution(prepared.evolve(picture, &device, &mut watchers, keep))?;
         let began = Instant::now();
-        let status = if evolved.ending.is_complete() { Status::Complete } else { Status::Partial };
+        let ending = evolved.ending;
+        let status = if ending.is_complete() { Status::Complete } else { Status::Partial };
         write(options, &prepared, evolved, interrupt, &mut row.output)?;
         // If snapshots could not be written, that is reported after the result has been saved.
-        row.output.extend(watchers.recorder.map(Recorder::outcome).transpose()?);
+        row.output.extend(watchers.recorder.map(|recorder| recorder.outcome(&ending)).transpose()?);
         row.output.extend(capture.map(|capture| end_capture(&capture, picture)).transpose()?);
         row.save_ms = terminal::milliseconds(began.elapsed());
         row.status = status;
@@ -134,7 +138,7 @@ impl Run<'_> {
 
 /// Checks, before anything is read, that all files can be written, and that none is written twice or is an input.
 fn check_places(options: &EvolveOptions) -> Result<()> {
-    let inputs = options.picture.picture_inputs();
+    let inputs = Inputs::new(options.picture.files_read());
     destination::check_writable(options.destinations(), &inputs)?;
     curve_file::check_writable(&options.files.curves, options.destinations(), &inputs)?;
     let mut written = options.files_written();

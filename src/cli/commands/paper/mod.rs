@@ -20,6 +20,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
+use crate::cli::files::guard::Inputs;
 use crate::cli::mosaics::{MosaicsArgs, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::{terminal, values};
@@ -119,7 +120,10 @@ fn try_make(args: &PaperArgs) -> Result<()> {
         _ => Vec::new(),
     };
     let interrupt = Interrupt::listen()?;
-    let folder = Folder::open(&args.output, args.mosaics.overwrite(), &interrupt)?;
+    let given = args.images.as_deref().filter(|_| args.name.needs_pictures()).map(std::fs::read_dir);
+    let given: Vec<PathBuf> = given.into_iter().flatten().flatten().flatten().map(|entry| entry.path()).collect();
+    let inputs = Inputs::new(given.iter().map(PathBuf::as_path));
+    let folder = Folder::open(&args.output, args.mosaics.overwrite(), inputs, &interrupt)?;
     let device = args.mosaics.computing.begin(verbosity)?;
     let began = Instant::now();
     let workshop = Workshop::new(&device, &interrupt, args.mosaics.progress());

@@ -59,6 +59,11 @@ pub(super) fn write(folder: &Path, files: &BTreeMap<String, String>, overwrite: 
     interrupt.while_writing(|| write_list(folder, &list))
 }
 
+/// The names of everything that [`write`] writes.
+pub(super) fn all_names(files: &BTreeMap<String, String>) -> impl Iterator<Item = &str> {
+    files.keys().map(String::as_str).chain([LIST])
+}
+
 fn old_list(folder: &Path, overwrite: Overwrite) -> Result<List> {
     let path = folder.join(LIST);
     let Ok(bytes) = fs::read(&path) else { return Ok(List::default()) };

@@ -11,6 +11,7 @@ pub(crate) use self::options::TimelapseArgs;
 use self::options::TimelapseOptions;
 use crate::archive;
 use crate::cli::files::destination;
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::snapshots::{self, Snapshot};
 use crate::cli::film::{self, Camera, End, Film, Shown};
 use crate::cli::terminal::interrupt::{EXIT_INTERRUPTED, Interrupt};
@@ -39,8 +40,9 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
     options.computing.start_threads()?;
     let snapshots = snapshots::list(&options.folder)?;
     let chosen = frames::choose(&snapshots, options.spacing, options.frame_count);
+    let inputs = Inputs::new(snapshots.iter().map(|snapshot| snapshot.path.as_path()));
     let snapshots: Vec<&Snapshot> = chosen.into_iter().map(|index| &snapshots[index]).collect();
-    film::check_writable(&options.outputs)?;
+    film::check_writable(&options.outputs, &inputs)?;
     let first = archive::read(&snapshots[0].path)?.population;
     let interrupt = Interrupt::listen()?;
     let shown =
