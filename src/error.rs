@@ -107,6 +107,14 @@ pub enum Error {
     /// The validation layer complained. It is only there if it was asked for.
     #[error("Vulkan validation: {0}")]
     Validation(String),
+    /// The system starts no more threads for this process or its user.
+    #[error(
+        "no more threads can be started ({reason}); end other programs, or raise the limit of processes (ulimit -u)"
+    )]
+    Threads {
+        /// What the system said.
+        reason: String,
+    },
     /// Somebody asked for the end before the work was done.
     #[error("interrupted")]
     Interrupted,

@@ -77,6 +77,8 @@ pub mod shapes;
 #[doc(hidden)]
 pub mod studio;
 #[doc(hidden)]
+pub mod threads;
+#[doc(hidden)]
 pub mod vector;
 #[doc(hidden)]
 pub mod vk;

@@ -20,7 +20,7 @@ use crate::cli::commands::score::ScoreArgs;
 use crate::cli::commands::timelapse::TimelapseArgs;
 use crate::cli::commands::video::VideoArgs;
 use crate::cli::list::BatchArgs;
-use crate::cli::terminal::{self, advice};
+use crate::cli::terminal::{self, advice, interrupt};
 use crate::cli::{commands, config};
 
 /// Evolves pictures into mosaics of thousands of tiles.
@@ -75,6 +75,9 @@ impl Cli {
 /// Does what the command line asks for; the exit code of the process.
 #[must_use]
 pub fn run(cli: &Cli) -> ExitCode {
+    if let failure @ Err(_) = interrupt::prepare() {
+        return terminal::exit_code(failure);
+    }
     match &cli.command {
         Command::Evolve(args) => commands::evolve::evolve(args),
         Command::Batch(args) => commands::batch::make(args, &cli.typed),

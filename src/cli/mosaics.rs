@@ -391,7 +391,7 @@ mod tests {
                 if number == 2 { Err(Error::Usage("broken".to_owned())) } else { Ok(number) }
             })
         };
-        let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("it starts");
+        let one_thread = crate::threads::pools(1, 1).pop().expect("it starts");
         let failed = one_thread.install(|| side_by_side(6, piece)).expect_err("the third fails");
         assert_eq!(failed.to_string(), "broken");
         assert_eq!(made.into_inner().expect("nobody panics"), [0, 1, 2]);

@@ -16,9 +16,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use stepping::Stepper;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::evolve::{Ended, Evolution, Observer, Seen, StopReason};
 use crate::model::Evaluator;
+use crate::threads;
 
 pub use self::crew::{Crew, Finished, PaperTask, SearchTask, Task};
 
@@ -29,7 +30,7 @@ pub use self::crew::{Crew, Finished, PaperTask, SearchTask, Task};
 /// thread: in a common pool, a thread that waits for others might begin another whole piece.
 ///
 /// # Errors
-/// The error of the first piece, in order, that fails; [`Error::Internal`] if threads cannot be started.
+/// The error of the first piece, in order, that fails.
 pub fn side_by_side<T: Send>(count: usize, piece: impl Fn(usize) -> Result<T> + Sync) -> Result<Vec<T>> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::with_capacity(count));
@@ -41,13 +42,12 @@ pub fn side_by_side<T: Send>(count: usize, piece: impl Fn(usize) -> Result<T> + 
         let result = piece(number);
         done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, result));
     };
-    let pools: Vec<rayon::ThreadPool> = (0..rayon::current_num_threads().min(count))
-        .map(|_| rayon::ThreadPoolBuilder::new().num_threads(1).build())
-        .collect::<Result<_, _>>()
-        .map_err(|error| Error::Internal(format!("threads cannot be started ({error})")))?;
+    threads::start(None)?;
+    let pools = threads::pools(rayon::current_num_threads().min(count), 1);
     std::thread::scope(|scope| {
-        for pool in &pools {
-            scope.spawn(|| pool.install(take_pieces));
+        let start = |pool| threads::spawn_in(scope, move || rayon::ThreadPool::install(pool, take_pieces)).ok();
+        if pools.iter().map_while(start).count() == 0 {
+            take_pieces();
         }
     });
     let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -148,10 +148,11 @@ impl Engine {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
 
     #[test]
     fn pieces_are_done_once_each_and_keep_their_order_and_their_threads_to_themselves() {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("a small pool");
+        let pool = threads::pools(1, 3).pop().expect("a small pool");
         let squares = pool.install(|| {
             side_by_side(50, |number| {
                 assert_eq!(rayon::current_num_threads(), 1);

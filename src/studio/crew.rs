@@ -16,6 +16,7 @@ use super::settings::Settings;
 use crate::engine::Crew;
 use crate::error::{Error, Result};
 use crate::evolve::Undisturbed;
+use crate::threads;
 use crate::vk::DeviceKind;
 
 /// Most pictures that evolve at the same time on a GPU, and on software Vulkan.
@@ -77,26 +78,34 @@ fn side_by_side(
 ) -> Result<()> {
     let tasks = Mutex::new(tasks.fuse().enumerate());
     let has_ended = AtomicBool::new(false);
-    let pools = (0..rayon::current_num_threads())
-        .map(|_| rayon::ThreadPoolBuilder::new().num_threads(1).build())
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(|error| Error::Internal(format!("threads cannot be started ({error})")))?;
+    threads::start(None)?;
+    let pools = threads::pools(rayon::current_num_threads(), 1);
+    let goes_on = || !has_ended.load(Ordering::Relaxed);
+    // Where `tasks` panicked in another thread, it has nothing more to give.
+    let next = || if goes_on() { tasks.lock().ok().and_then(|mut tasks| tasks.next()) } else { None };
+    let make = |task: Result<(Picture, Recipe)>| {
+        task.and_then(|(picture, recipe)| recipe.make(&picture, device, |_| goes_on()))
+    };
     std::thread::scope(|scope| {
         let (made_in, made) = sync_channel(0);
-        for pool in &pools {
-            let (tasks, has_ended, made_in) = (&tasks, &has_ended, made_in.clone());
-            scope.spawn(move || {
-                let goes_on = || !has_ended.load(Ordering::Relaxed);
-                while goes_on() {
-                    // Where `tasks` panicked in another thread, it has nothing more to give.
-                    let next = tasks.lock().ok().and_then(|mut tasks| tasks.next());
-                    let Some((number, task)) = next else { return };
-                    let make = || task.and_then(|(picture, recipe)| recipe.make(&picture, device, |_| goes_on()));
-                    if made_in.send((number, pool.install(make))).is_err() {
+        let start = |pool| {
+            let made_in = made_in.clone();
+            let work = move || {
+                while let Some((number, task)) = next() {
+                    let mosaic = rayon::ThreadPool::install(pool, || make(task));
+                    if made_in.send((number, mosaic)).is_err() {
                         return;
                     }
                 }
-            });
+            };
+            threads::spawn_in(scope, work).ok()
+        };
+        if pools.iter().map_while(start).count() == 0 {
+            while let Some((number, task)) = next() {
+                if !done(number, make(task)) {
+                    return;
+                }
+            }
         }
         drop(made_in);
         let _ends_all = EndsAll(&has_ended);

@@ -18,7 +18,7 @@ use crate::evolve::{Palette, PaperScheme, begin_from, first_population};
 use crate::model::cells::Course;
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::{Backdrop, Blend, Fly, Grout, MaskSet, Population, Rgb, Scene, Target};
-use crate::photo;
+use crate::{photo, threads};
 
 /// The inputs of one evolution, read and fitted together.
 #[derive(Debug)]
@@ -74,6 +74,8 @@ impl Job {
     }
 
     fn new(source: &Source<'_>, settings: &Settings) -> Result<Self> {
+        // What is made of a picture is made in parallel from here on.
+        threads::start(None)?;
         let init = settings.init.as_ref().map(population).transpose()?;
         let of_init = init.as_ref().map(|population| population.background.color());
         let asked_for = settings.background.or(of_init);

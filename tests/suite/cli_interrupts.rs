@@ -34,7 +34,7 @@ fn status_of(workshop: &Workshop, name: &str) -> String {
 
 #[test]
 fn every_signal_that_asks_for_an_end_leaves_the_best_so_far_marked_as_partial() {
-    for signal in ["INT", "TERM", "USR1"] {
+    for signal in ["INT", "TERM", "USR1", "HUP"] {
         let workshop = Workshop::new();
         let (status, messages) = interrupted(&workshop, &format!("{ENDLESS} -o a.png -o a.npz"), &[signal]);
         assert_eq!(status.code(), Some(75), "{signal}: {messages}");

@@ -7,7 +7,7 @@ use crate::sources::{Source, code, ends_of, is_word_char, source, sources};
 /// The modules of the crate, lowest level first. A module imports only modules of lower levels.
 const LEVELS: [&[&str]; 8] = [
     &["error", "guard", "memory"],
-    &["photo", "output", "model", "metrics", "plot"],
+    &["photo", "output", "model", "metrics", "plot", "threads"],
     &["archive", "evolve", "guide", "shapes", "cpu", "vk", "vector", "openraster"],
     &["gpu"],
     &["engine"],
@@ -21,7 +21,7 @@ const FORBIDDEN: [(&str, &[&str], &str); 1] =
     [("engine", &["cpu", "gpu", "vk"], "the engine knows evaluators by their trait, so that it names no backend")];
 
 /// Words that only some modules may say.
-const RESERVED: [(&[&str], &[&str], &str); 4] = [
+const RESERVED: [(&[&str], &[&str], &str); 5] = [
     (&["unsafe"], &["vk"], "only `vk` is unsafe; give it a safe function"),
     (
         &["println!", "eprintln!", "print!", "eprint!", "stdout", "stderr"],
@@ -29,6 +29,11 @@ const RESERVED: [(&[&str], &[&str], &str); 4] = [
         "only `cli` prints; return a value or an error",
     ),
     (&["std::env", "env::"], &["cli", "main"], "only `cli` reads the environment; take an option"),
+    (
+        &["thread::spawn", "scope.spawn", "thread::Builder", "ThreadPoolBuilder"],
+        &["threads"],
+        "only `threads` starts threads, since it minds that the system may refuse",
+    ),
     (&["Instant", "SystemTime"], &["cli", "main"], "only `cli` reads the clock; take a duration or a stop reason"),
 ];
 
@@ -136,7 +141,7 @@ fn every_module_imports_only_modules_of_lower_levels() {
 }
 
 #[test]
-fn only_vk_is_unsafe_and_only_the_command_line_prints_or_reads_the_clock_or_the_environment() {
+fn only_the_modules_that_are_named_do_what_the_others_may_not() {
     let mut complaints = Vec::new();
     for source in sources() {
         for (words, modules, why) in RESERVED {

@@ -143,6 +143,25 @@ fn an_interrupt_leaves_whole_snapshots_up_to_where_it_came() {
 }
 
 #[test]
+fn after_an_interrupted_run_the_same_command_leaves_the_folder_that_an_undisturbed_one_leaves() {
+    let workshop = Workshop::new();
+    let line = "evolve photo.png --scheme paper -n 60 --births 300k --progress json -o a.npz --save-every 50k";
+    assert_eq!(workshop.run(&format!("{line} --save-run whole")).code, Some(0));
+    let whole = files_in(&workshop, "whole");
+    let line = format!("{line} --save-run run --force");
+    let (status, messages) = interrupted(&workshop, &line, &["INT"]);
+    assert_eq!(status.code(), Some(75), "{messages}");
+    let between: Vec<String> =
+        files_in(&workshop, "run").into_keys().filter(|name| !whole.contains_key(name)).collect();
+    assert_eq!(between.len(), 1, "the end of the interrupted run is kept: {between:?}");
+    workshop.write("run/202401010000.npz", b"mine");
+    assert_eq!(workshop.run(&line).code, Some(0));
+    let mut after = files_in(&workshop, "run");
+    assert_eq!(after.remove("202401010000.npz").as_deref(), Some(&b"mine"[..]));
+    assert!(after == whole, "{:?} and {:?}", after.keys(), whole.keys());
+}
+
+#[test]
 fn a_folder_that_is_the_input_or_another_output_is_refused() {
     let workshop = Workshop::new();
     for (rest, words) in [

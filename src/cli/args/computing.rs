@@ -7,6 +7,7 @@ use crate::cli::terminal::{self, Verbosity};
 use crate::cli::values;
 use crate::error::{Error, NoDevice, Result};
 use crate::studio::{self, Device};
+use crate::threads;
 use crate::vk::{DeviceRequest, Validation};
 
 /// Most CPU threads.
@@ -102,13 +103,14 @@ impl ComputingArgs {
 }
 
 impl Computing {
-    /// Gives the CPU twin as many threads as were asked for.
+    /// Starts the threads of the CPU: as many as were asked for, or as many as there are processors.
     pub(crate) fn start_threads(&self) -> Result<()> {
-        let Some(count) = self.threads else { return Ok(()) };
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(count)
-            .build_global()
-            .map_err(|error| Error::Usage(format!("--threads {count}: the threads cannot be started ({error})")))
+        threads::start(self.threads).map_err(|error| match (self.threads, error) {
+            (Some(count), Error::Threads { reason }) => {
+                Error::Usage(format!("--threads {count}: the threads cannot be started ({reason}); ask for fewer"))
+            }
+            (_, error) => error,
+        })
     }
 
     /// CPU threads: as many as were asked for, or all.

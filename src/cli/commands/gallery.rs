@@ -11,7 +11,8 @@ use std::time::Instant;
 
 use clap::Args;
 
-use crate::cli::files::destination::Overwrite;
+use crate::cli::files::destination::{self, Overwrite};
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::sheet::sheet;
 use crate::cli::mosaics::{Made, MosaicsArgs, PaperRecipe, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;
@@ -63,11 +64,14 @@ pub(crate) fn make(args: &GalleryArgs) -> ExitCode {
 }
 
 fn try_make(args: &GalleryArgs) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
     let page = args.output.join("README.md");
     check_folder(&args.output, &page, args.mosaics.overwrite())?;
+    let written: Vec<PathBuf> = Shader::ALL.iter().map(|&shader| args.output.join(file_of(shader))).collect();
+    let written = written.iter().chain([&page]).map(PathBuf::as_path);
+    Inputs::new(args.inputs.iter().map(PathBuf::as_path)).refuse(written)?;
     let verbosity = args.mosaics.verbosity();
     let targets = args.inputs.iter().map(|path| read(path, verbosity)).collect::<Result<Vec<_>>>()?;
+    let interrupt = Interrupt::listen()?;
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
     output::check_writable(&page)?;
@@ -95,6 +99,9 @@ fn try_make(args: &GalleryArgs) -> Result<()> {
 fn check_folder(folder: &Path, page: &Path, overwrite: Overwrite) -> Result<()> {
     if folder.is_file() {
         return Err(Error::Usage(format!("{} is a file; name a folder", folder.display())));
+    }
+    if folder.is_dir() {
+        destination::sweep(folder)?;
     }
     let mut head = Vec::new();
     let read = File::open(page).and_then(|file| file.take(TITLE.len() as u64).read_to_end(&mut head));

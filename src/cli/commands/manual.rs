@@ -8,7 +8,9 @@ use std::process::ExitCode;
 use clap::{Args, Command};
 use clap_complete::Shell;
 
+use crate::cli::files::destination;
 use crate::cli::terminal;
+use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -79,8 +81,12 @@ fn rendered(command: &Command) -> Result<Vec<u8>> {
 fn write(pages: &[Command], folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder)
         .map_err(|error| Error::output(folder, format!("the folder cannot be created ({error}); name another one")))?;
+    destination::sweep(folder)?;
+    let interrupt = Interrupt::listen()?;
     for command in pages {
-        output::write_atomically(&folder.join(format!("{}.1", command.get_name())), &rendered(command)?)?;
+        interrupt.check()?;
+        let (path, page) = (folder.join(format!("{}.1", command.get_name())), rendered(command)?);
+        interrupt.while_writing(|| output::write_atomically(&path, &page))?;
     }
     terminal::say(&format!("wrote {} pages to {}", pages.len(), folder.display()));
     Ok(())

@@ -13,6 +13,7 @@ use crate::archive::{self, Archive};
 use crate::cli::args::computing::{self, Computing, ComputingArgs};
 use crate::cli::args::look::LookArgs;
 use crate::cli::files::destination::{self, Destination, Overwrite};
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::{memory, outputs, replacing};
 use crate::cli::jobs::row::Status;
 use crate::cli::terminal::interrupt::Interrupt;
@@ -208,7 +209,9 @@ pub(crate) fn render(args: &RenderArgs) -> ExitCode {
 /// The work, in order: check, read, draw, encode and write.
 fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()> {
     options.computing.start_threads()?;
-    destination::check_writable(options.outputs.iter(), &[&options.input])?;
+    let masks = options.look.iter().flat_map(Look::mask_paths).filter(|path| path.exists());
+    let inputs = Inputs::new(masks.chain([options.input.as_path()]));
+    destination::check_writable(options.outputs.iter(), &inputs)?;
     let device = options.computing.select()?;
     row.device = Some(device.label().to_owned());
 
@@ -242,6 +245,7 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
     let began = Instant::now();
     let files = outputs::encode(&options.outputs.iter().collect::<Vec<_>>(), &drawn, &provenances.told(&meta))?;
     // Before this point an interrupt leaves no files.
+    destination::sweep_beside(options.outputs.iter().map(|output| output.path.as_path()));
     outputs::write(&files, &Interrupt::listen()?, &mut row.output)?;
     row.save_ms = terminal::milliseconds(began.elapsed());
     row.status = Status::Complete;

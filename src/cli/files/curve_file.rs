@@ -10,7 +10,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::destination::{self, Destination, Overwrite};
+use super::destination::{Destination, Overwrite};
+use super::guard::{Inputs, place_of};
 use super::story::Story;
 use crate::archive::KEY_DIGITS;
 use crate::cli::terminal::interrupt::Interrupt;
@@ -145,12 +146,12 @@ impl CurveFile {
 pub(crate) fn check_writable<'a>(
     curves: &[CurveFile],
     others: impl Iterator<Item = &'a Destination>,
-    inputs: &[&Path],
+    inputs: &Inputs,
 ) -> Result<()> {
-    let mut seen: Vec<PathBuf> = others.map(|other| destination::place_of(&other.path)).collect();
+    let mut seen: Vec<PathBuf> = others.map(|other| place_of(&other.path)).collect();
     for CurveFile { path, .. } in curves {
-        let place = destination::place_of(path);
-        if destination::is_one_of(&place, inputs) {
+        let place = place_of(path);
+        if inputs.has(path) {
             return Err(Error::Usage(format!("{} is an input; name another file for the curve", path.display())));
         }
         if seen.contains(&place) {

@@ -1,9 +1,11 @@
 //! Where results go: what a path's ending asks for, and whether the path may be written to.
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::io::IsTerminal;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
+use super::guard::{Inputs, place_of};
 use crate::error::{Error, Result};
 use crate::output;
 use crate::photo::WEBP_SIDE_MAX_PX;
@@ -128,7 +130,7 @@ pub(crate) fn check_fits_formats(outputs: &[Destination], (width_px, height_px):
 
 /// Checks, before anything is read, that every destination can be written, none is named twice, and none is one of
 /// `inputs`.
-pub(crate) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destination>, inputs: &[&Path]) -> Result<()> {
+pub(crate) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destination>, inputs: &Inputs) -> Result<()> {
     let mut seen: Vec<PathBuf> = Vec::new();
     for destination in destinations {
         let place = place_of(&destination.path);
@@ -145,12 +147,7 @@ pub(crate) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destinat
                 return Err(Error::output(Path::new("stdout"), reason));
             }
         } else {
-            if is_one_of(&place, inputs) {
-                return Err(Error::Usage(format!(
-                    "{} is an input; name another file for the output",
-                    destination.path.display()
-                )));
-            }
+            inputs.refuse([destination.path.as_path()])?;
             output::check_writable(&destination.path)?;
         }
         seen.push(place);
@@ -187,40 +184,19 @@ pub(crate) fn sweep(folder: &Path) -> Result<()> {
     output::sweep(folder, |found| found.modified().ok()?.elapsed().ok())
 }
 
-/// Whether one of these files lies at `place`.
-pub(crate) fn is_one_of(place: &Path, paths: &[&Path]) -> bool {
-    paths.iter().any(|path| place == place_of(path))
-}
-
-/// One name for one file, however its path was written, even if its folder does not exist yet.
-pub(crate) fn place_of(path: &Path) -> PathBuf {
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    for known in absolute.ancestors() {
-        let Ok(mut place) = known.canonicalize() else { continue };
-        let unknown = absolute.strip_prefix(known).unwrap_or(Path::new(""));
-        // What does not exist cannot be a link, so `..` leads back to its parent.
-        unknown.components().for_each(|part| match part {
-            Component::ParentDir => drop(place.pop()),
-            Component::CurDir => {}
-            part => place.push(part),
-        });
-        return place;
+/// Removes what killed processes left beside files that are about to be written. A failure is ignored: we may be
+/// allowed to write a file in a folder but not to list it.
+pub(crate) fn sweep_beside<'a>(files: impl Iterator<Item = &'a Path>) {
+    let folder = |file: &'a Path| file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folders: BTreeSet<&Path> = files.map(|file| folder(file).unwrap_or(Path::new("."))).collect();
+    for folder in folders {
+        let _ = sweep(folder);
     }
-    absolute
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_file_has_one_place_even_in_a_folder_that_is_still_to_be_made() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let place = |name: &str| place_of(&folder.path().join(name));
-        assert_eq!(place("new/deep/a.png"), place("new/./x/../deep/a.png"));
-        assert_ne!(place("new/deep/a.png"), place("new/a.png"));
-        assert!(place("new/a.png").is_absolute());
-    }
 
     #[test]
     fn an_output_in_the_place_of_any_input_is_refused_by_name() {
@@ -229,7 +205,7 @@ mod tests {
         for path in [&picture, &map] {
             std::fs::write(path, b"whatever").expect("the folder is ours");
         }
-        let inputs = [picture.as_path(), map.as_path()];
+        let inputs = Inputs::new([picture.as_path(), map.as_path()]);
         let check = |path: &Path| {
             let destination = Destination::for_result(path).expect("it ends in .png");
             check_writable(std::iter::once(&destination), &inputs)

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use glob::{MatchOptions, Pattern};
 
-use super::destination::place_of;
+use super::guard::place_of;
 use super::left_out::LeftOut;
 use crate::error::{Error, Result};
 use crate::photo;

@@ -4,6 +4,7 @@
 pub(crate) mod child;
 pub(crate) mod curve_file;
 pub(crate) mod destination;
+pub(crate) mod guard;
 pub(crate) mod inputs;
 pub(crate) mod left_out;
 pub(crate) mod memory;

@@ -2,15 +2,17 @@
 //! evals are births.
 //!
 //! Names and metadata tell everything, so no index can disagree with the files. All snapshots with one key lie on one
-//! course. A folder may therefore hold those of an interrupted run beside those of its repetition.
+//! course. A folder may therefore hold those of an interrupted run, until a whole one leaves only its own.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::destination::{Overwrite, is_one_of, place_of};
+use super::destination::Overwrite;
+use super::guard::{Inputs, place_of};
 use crate::archive;
 use crate::cli::values::in_range;
 use crate::error::{Error, Result};
@@ -57,10 +59,13 @@ impl SaveRun {
     ///
     /// # Errors
     /// [`Error::Usage`] if it is.
-    pub(crate) fn check_place<'a>(&self, mut others: impl Iterator<Item = &'a Path>, inputs: &[&Path]) -> Result<()> {
+    pub(crate) fn check_place<'a>(&self, mut others: impl Iterator<Item = &'a Path>, inputs: &Inputs) -> Result<()> {
         let (place, folder) = (place_of(&self.folder), self.folder.display());
-        if is_one_of(&place, inputs) {
+        if inputs.has(&self.folder) {
             return Err(Error::Usage(format!("{folder} is an input; name another folder for the snapshots")));
+        }
+        if inputs.are_in(&self.folder) {
+            return Err(Error::Usage(format!("{folder} holds an input; name another folder for the snapshots")));
         }
         if others.any(|other| place_of(other) == place) {
             return Err(Error::Usage(format!("{folder} is named twice as an output")));
@@ -106,6 +111,18 @@ impl SaveRun {
             others.filter(|path| key_of(path).is_some_and(|found| found != key)).try_for_each(fs::remove_file)
         };
         prepare().map_err(|error| self.unusable(&error))
+    }
+
+    /// Removes the snapshots of the evolution with this key that are not after one of these numbers of evals.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub(crate) fn keep_only(&self, evals: &BTreeSet<u64>, key: &str) -> Result<()> {
+        let is_surplus = |path: &PathBuf| {
+            evals_of(path).is_some_and(|found| !evals.contains(&found)) && key_of(path).as_deref() == Some(key)
+        };
+        let remove = || contents(&self.folder)?.snapshots.into_iter().filter(is_surplus).try_for_each(fs::remove_file);
+        remove().map_err(|error| self.unusable(&error))
     }
 
     /// The file of the snapshot after this many evals.

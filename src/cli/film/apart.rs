@@ -10,9 +10,16 @@ use std::time::Duration;
 use crate::cli::files::child::in_its_own_group;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
+use crate::threads;
 
 /// Time between two looks at whether a process has ended, or must be ended.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
+
+/// What ffmpeg may open: the file itself. A playlist or a script of a demuxer could name other files, or hosts.
+const PROTOCOLS: &str = "file";
+/// The containers that ffmpeg may take a file for, whatever its ending. None of them names other files.
+const FORMATS: &str = "mov,matroska,avi,mpegts,mpeg,mpegvideo,h264,hevc,m4v,ogg,flv,asf,gif,apng,\
+                       yuv4mpegpipe,nut,mxf,dv,ivf,obu,rm,mjpeg,wtv,vc1,h261,h263";
 
 /// Writes all frames of `video` into `folder` as PNG files that are named by their numbers. Returns the frames per
 /// second, rounded, if the video tells them.
@@ -21,7 +28,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(10);
 /// [`Error::Input`] if there is no ffmpeg, or it cannot read the video; [`Error::Interrupted`].
 pub(crate) fn take_apart(video: &Path, folder: &Path, interrupt: &Interrupt) -> Result<Option<u64>> {
     let mut command = Command::new("ffmpeg");
-    command.args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y", "-i"]).arg(as_file(video));
+    command.args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y"]);
+    command.args(["-protocol_whitelist", PROTOCOLS, "-format_whitelist", FORMATS, "-i"]).arg(as_file(video));
     command.args([
         "-map",
         "0:v:0",
@@ -34,9 +42,22 @@ pub(crate) fn take_apart(video: &Path, folder: &Path, interrupt: &Interrupt) -> 
         "-f",
         "image2",
     ]);
-    run(command.arg(as_file(&folder.join("%08d.png"))), video, interrupt)?;
+    run(command.arg(pattern(folder)), video, interrupt)?;
     let mut command = Command::new("ffprobe");
-    command.args(["-v", "error", "-select_streams", "v:0", "-show_entries", "stream=r_frame_rate", "-of", "csv=p=0"]);
+    command.args([
+        "-v",
+        "error",
+        "-protocol_whitelist",
+        PROTOCOLS,
+        "-format_whitelist",
+        FORMATS,
+        "-select_streams",
+        "v:0",
+        "-show_entries",
+        "stream=r_frame_rate",
+        "-of",
+        "csv=p=0",
+    ]);
     let told = run(command.arg(as_file(video)), video, interrupt)?;
     Ok(rate(&String::from_utf8_lossy(&told)))
 }
@@ -46,6 +67,21 @@ fn as_file(path: &Path) -> OsString {
     let mut file = OsString::from("file:");
     file.push(path);
     file
+}
+
+/// The names of the frames in `folder`, in which ffmpeg takes a `%` for the beginning of a number.
+fn pattern(folder: &Path) -> OsString {
+    let mut file = as_file(folder).into_encoded_bytes();
+    let mut place = 0;
+    while let Some(found) = file[place..].iter().position(|&byte| byte == b'%') {
+        file.insert(place + found, b'%');
+        place += found + 2;
+    }
+    #[cfg(unix)]
+    let folder: OsString = std::os::unix::ffi::OsStringExt::from_vec(file);
+    #[cfg(not(unix))]
+    let folder: OsString = String::from_utf8_lossy(&file).into_owned().into();
+    Path::new(&folder).join("%08d.png").into_os_string()
 }
 
 /// A process that is killed if this is dropped before it has ended.
@@ -70,7 +106,8 @@ fn run(command: &mut Command, video: &Path, interrupt: &Interrupt) -> Result<Vec
     };
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = Running(in_its_own_group(command).spawn().map_err(unusable)?);
-    let (stdout, stderr) = (child.0.stdout.take().map(read_all), child.0.stderr.take().map(read_all));
+    let stdout = child.0.stdout.take().map(read_all).transpose()?;
+    let stderr = child.0.stderr.take().map(read_all).transpose()?;
     let status = loop {
         interrupt.check()?;
         match child.0.try_wait().map_err(unusable)? {
@@ -84,13 +121,18 @@ fn run(command: &mut Command, video: &Path, interrupt: &Interrupt) -> Result<Vec
         return Ok(stdout);
     }
     let said = String::from_utf8_lossy(&stderr);
+    if said.contains("not on whitelist") {
+        let reason = "is no kind of video that is read, or names other files, which is not followed; give another video, \
+                      or a folder of frames";
+        return Err(Error::input(video, reason));
+    }
     let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("it gave no reason").trim();
     Err(Error::input(video, format!("cannot be read by ffmpeg ({last}); give another video, or a folder of frames")))
 }
 
 /// Reads a pipe to its end, since a full pipe would block its writer.
-fn read_all(mut pipe: impl Read + Send + 'static) -> JoinHandle<Vec<u8>> {
-    std::thread::spawn(move || {
+fn read_all(mut pipe: impl Read + Send + 'static) -> Result<JoinHandle<Vec<u8>>> {
+    threads::spawn("ffmpeg", move || {
         let mut bytes = Vec::new();
         // What was read before a failure may tell its reason.
         let _ = pipe.read_to_end(&mut bytes);
@@ -107,7 +149,14 @@ fn rate(text: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use crate::cli::film::apart::rate;
+    use std::path::Path;
+
+    use crate::cli::film::apart::{pattern, rate};
+
+    #[test]
+    fn a_percent_sign_in_the_name_of_a_folder_is_no_place_for_a_number() {
+        assert_eq!(pattern(Path::new("50%/a%d")), "file:50%%/a%%d/%08d.png");
+    }
 
     #[test]
     fn a_rate_is_a_fraction_rounded() {

@@ -11,6 +11,7 @@ use crate::cli::files::child::in_its_own_group;
 use crate::error::{Error, Result};
 use crate::model::Mosaic;
 use crate::photo::Frames;
+use crate::threads;
 
 /// The program, which the system finds in the user's `PATH`.
 const PROGRAM: &str = "ffmpeg";
@@ -85,7 +86,16 @@ impl Ffmpeg {
         let mut command = Command::new(PROGRAM);
         command
             .args(["-hide_banner", "-nostdin", "-loglevel", "error", "-y"])
-            .args(["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &format!("{width_px}x{height_px}")])
+            .args([
+                "-protocol_whitelist",
+                "pipe",
+                "-f",
+                "rawvideo",
+                "-pix_fmt",
+                "rgb24",
+                "-s",
+                &format!("{width_px}x{height_px}"),
+            ])
             .args(["-r", &timing.frames_per_s.to_string(), "-i", "pipe:0", "-an"])
             // Named explicitly, since players otherwise guess the colour matrix from the size.
             .args(["-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"])
@@ -97,16 +107,14 @@ impl Ffmpeg {
             .stdout(Stdio::null())
             .stderr(Stdio::piped());
         let mut child = in_its_own_group(&mut command).spawn().map_err(|error| not_started(&output.path, &error))?;
-        let complaint = child.stderr.take().map(|stderr| std::thread::spawn(move || last_line(BufReader::new(stderr))));
+        let (frames, stderr) = (child.stdin.take(), child.stderr.take());
         let hold_frames = (u32::from(timing.last_cs) * u32::from(timing.frames_per_s)).div_ceil(100);
-        Ok(Self {
-            path: output.path.clone(),
-            frames: child.stdin.take(),
-            child,
-            complaint,
-            last: Vec::new(),
-            hold_frames,
-        })
+        let mut ffmpeg =
+            Self { path: output.path.clone(), frames, child, complaint: None, last: Vec::new(), hold_frames };
+        // If no thread can be started, the process is ended.
+        let read = |stderr| threads::spawn("ffmpeg", move || last_line(BufReader::new(stderr)));
+        ffmpeg.complaint = stderr.map(read).transpose()?;
+        Ok(ffmpeg)
     }
 
     /// Adds the next frame.

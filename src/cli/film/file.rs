@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use crate::cli::files::destination;
+use crate::cli::files::guard::{Inputs, place_of};
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -58,16 +58,17 @@ impl AnimationFile {
     }
 }
 
-/// Checks that every output can be written, that none is named twice, and that none is a device or a pipe, since
-/// encoders must seek in the file.
+/// Checks that every output can be written, that none is an input or named twice, and that none is a device or a pipe,
+/// since encoders must seek in the file.
 ///
 /// # Errors
 /// [`Error::Usage`] or [`Error::Output`].
-pub(crate) fn check_writable(outputs: &[AnimationFile]) -> Result<()> {
+pub(crate) fn check_writable(outputs: &[AnimationFile], inputs: &Inputs) -> Result<()> {
+    inputs.refuse(outputs.iter().map(|output| output.path.as_path()))?;
     for (index, output) in outputs.iter().enumerate() {
         let path = output.path.display();
-        let place = destination::place_of(&output.path);
-        if outputs[..index].iter().any(|other| destination::place_of(&other.path) == place) {
+        let place = place_of(&output.path);
+        if outputs[..index].iter().any(|other| place_of(&other.path) == place) {
             return Err(Error::Usage(format!("{path} is named twice as an output")));
         }
         if output.path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {

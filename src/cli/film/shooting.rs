@@ -18,6 +18,7 @@ use crate::error::{Error, Result};
 use crate::model::{Backdrop, Canvas, Mosaic, Painter, Population, Rgb};
 use crate::photo::{Frames, Timing};
 use crate::studio::{Device, estimate_bytes, usual_supersampling};
+use crate::threads;
 
 /// How many frames may wait for each output's encoder.
 const QUEUE_LENGTH: usize = 1;
@@ -62,14 +63,15 @@ pub(crate) fn shoot(
 ) -> Result<(End, Vec<Result<Film>>)> {
     std::thread::scope(|scope| {
         let mut feeds = Vec::new();
-        let workers: Vec<_> = films
-            .into_iter()
-            .map(|mut film| {
-                let (feed, frames) = sync_channel::<Arc<Mosaic>>(QUEUE_LENGTH);
-                feeds.push(feed);
-                scope.spawn(move || frames.into_iter().try_for_each(|frame| film.add(&frame)).map(|()| film))
-            })
-            .collect();
+        let start = |mut film: Film| {
+            let (feed, frames) = sync_channel::<Arc<Mosaic>>(QUEUE_LENGTH);
+            let encode = move || frames.into_iter().try_for_each(|frame| film.add(&frame)).map(|()| film);
+            let worker = threads::spawn_in(scope, encode)?;
+            feeds.push(feed);
+            Ok(worker)
+        };
+        // If one cannot be started, the feeds of the others are dropped, which ends them.
+        let workers = films.into_iter().map(start).collect::<Result<Vec<_>>>()?;
         let drawn = draw(feeds, paths, camera, interrupt, &mut progress);
         progress.finish();
         let ended = || Err(Error::Internal("a thread that encodes ended".to_owned()));

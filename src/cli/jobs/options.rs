@@ -54,9 +54,9 @@ impl PictureOptions {
         self.settings.scheme.seed()
     }
 
-    /// The pictures that decide the target. None of them may be overwritten.
-    pub fn picture_inputs(&self) -> Vec<&Path> {
-        std::iter::once(self.input.as_path()).chain(self.settings.weight_file()).collect()
+    /// All files that are read for the picture. None of them may be overwritten.
+    pub fn files_read(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(self.input.as_path()).chain(self.settings.files_read())
     }
 
     /// Longer side of the written picture in px, if it differs from the size at which the mosaic was evolved.

@@ -4,6 +4,7 @@
 //! command leaves the same files on every machine. A separate thread encodes and writes. The evolution copies its
 //! flies, and waits if that thread falls behind, so memory stays flat.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -12,9 +13,9 @@ use serde_json::{Map, Value, json};
 
 use crate::cli::files::snapshots::SaveRun;
 use crate::error::{Error, Result};
-use crate::evolve::{Seen, Stage};
+use crate::evolve::{Ending, Seen, Stage};
 use crate::model::{Fly, Population};
-use crate::{archive, output};
+use crate::{archive, output, threads};
 
 /// How many snapshots may wait to be written.
 const QUEUE_LENGTH: usize = 2;
@@ -44,6 +45,10 @@ pub(crate) struct Recorder {
     last: Option<u64>,
     /// The run that the last generation belonged to.
     run: u32,
+    /// The number of evals at every snapshot.
+    taken: BTreeSet<u64>,
+    /// The key of the evolution.
+    key: String,
     queue: Option<SyncSender<Passed>>,
     writer: Option<JoinHandle<Result<()>>>,
     /// The outcome of the thread that writes.
@@ -62,10 +67,11 @@ impl Recorder {
         stage: Population,
         told: Map<String, Value>,
     ) -> Result<Self> {
-        save_run.prepare(told.get("key").and_then(Value::as_str).unwrap_or_default())?;
+        let key = told.get("key").and_then(Value::as_str).unwrap_or_default().to_owned();
+        save_run.prepare(&key)?;
         let (queue, passed) = sync_channel::<Passed>(QUEUE_LENGTH);
         let writing = save_run.clone();
-        let writer = std::thread::Builder::new().name("snapshots".to_owned()).spawn(move || {
+        let writer = threads::spawn("snapshots", move || {
             let (mut population, mut made) = (stage, Vec::new());
             let written = passed.into_iter().try_for_each(|passed| {
                 let path = writing.path_of(passed.evals);
@@ -76,17 +82,16 @@ impl Recorder {
             });
             written.map_err(|error| make_room(&writing.folder, &made, error))
         });
-        let writer = writer.map_err(|error| {
-            Error::output(&save_run.folder, format!("no thread can be started to write to it ({error})"))
-        })?;
         Ok(Self {
             save_run: save_run.clone(),
             every: save_run.evals_between(evals_planned),
             due: 0,
             last: None,
             run: 0,
+            taken: BTreeSet::new(),
+            key,
             queue: Some(queue),
-            writer: Some(writer),
+            writer: Some(writer?),
             written: Ok(()),
         })
     }
@@ -123,12 +128,17 @@ impl Recorder {
         }
     }
 
-    /// The folder, if all snapshots are in it. Call it after [`Recorder::finish`].
+    /// The folder, if all snapshots are in it. Call it after [`Recorder::finish`]. After a whole evolution, nothing is
+    /// left of the ends of interrupted ones: the folder is as if nothing had disturbed it.
     ///
     /// # Errors
     /// The error of the first snapshot that could not be written.
-    pub(crate) fn outcome(self) -> Result<String> {
-        self.written.map(|()| self.save_run.folder.display().to_string())
+    pub(crate) fn outcome(self, ending: &Ending) -> Result<String> {
+        self.written?;
+        if ending.is_complete() {
+            self.save_run.keep_only(&self.taken, &self.key)?;
+        }
+        Ok(self.save_run.folder.display().to_string())
     }
 
     fn take(&mut self, seen: &mut Seen<'_>) -> Result<()> {
@@ -138,6 +148,7 @@ impl Recorder {
         if self.last.replace(evals) == Some(evals) {
             return Ok(());
         }
+        self.taken.insert(evals);
         let sae = seen.sae()?;
         let told = match seen {
             Seen::Evolutions(_) => json!({ "births": births, "run": self.run, "sae": sae }),
@@ -233,7 +244,7 @@ mod tests {
         let evolutions = [evolution];
         recorder.note(&mut Seen::Evolutions(&evolutions)).expect("there is no device");
         recorder.finish(&mut Seen::Evolutions(&evolutions)).expect("there is no device");
-        let sentence = recorder.outcome().expect_err("there is no folder").to_string();
+        let sentence = recorder.written.expect_err("there is no folder").to_string();
         assert!(sentence.contains("000000000000.npz: its folder does not exist"), "{sentence}");
     }
 }

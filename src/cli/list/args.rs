@@ -82,6 +82,9 @@ pub(crate) struct BatchArgs {
     /// Names of the outputs, with {stem} {suffix} {dir} {id} {group} {index} {seed} {ext}
     #[arg(long, value_name = "NAME", value_parser = name::parse, default_value = "{dir}/{stem}.{ext}", help_heading = "Output")]
     pub name: NameTemplate,
+    /// Let rows of the manifest name outputs outside of the output folder
+    #[arg(long, requires = "manifest", help_heading = "Output")]
+    pub allow_outside: bool,
     /// What to do about outputs that are there already
     #[arg(long, value_enum, value_name = "WHAT", default_value = "skip-same", help_heading = "Output")]
     pub on_exists: OnExists,

@@ -7,7 +7,8 @@ use std::sync::Arc;
 
 use super::manifest::{ManifestRow, Outputs};
 use super::name::{Known, NameTemplate, spelt};
-use crate::cli::files::destination::{Destination, place_of};
+use crate::cli::files::destination::Destination;
+use crate::cli::files::guard::{Inputs, only_place_of, place_of};
 use crate::cli::files::inputs::Found;
 use crate::cli::jobs::options::PictureOptions;
 use crate::cli::terminal::advice;
@@ -60,6 +61,8 @@ pub(crate) struct Naming<'a> {
     pub template: &'a NameTemplate,
     /// File name endings, each of a different format.
     pub formats: &'a [String],
+    /// Whether rows of the manifest may name outputs outside of the folder.
+    pub allow_outside: bool,
 }
 
 /// A picture that has no unique id and no outputs yet.
@@ -67,6 +70,8 @@ struct Draft {
     row: ManifestRow,
     relative: PathBuf,
     common: Arc<PictureOptions>,
+    /// Its line in the manifest, if it comes from there.
+    line: Option<usize>,
 }
 
 /// The items of a batch: first the files that were found, then the rows of the manifest, each with its line number.
@@ -85,7 +90,7 @@ pub(crate) fn gather(
     let common = Arc::new(options_with(&[])?);
     let of_found = |Found { path, relative }| {
         let row = ManifestRow { input: path, ..ManifestRow::default() };
-        Draft { row, relative, common: Arc::clone(&common) }
+        Draft { row, relative, common: Arc::clone(&common), line: None }
     };
     let mut drafts: Vec<Draft> = found.into_iter().map(of_found).collect();
     let mut known: HashMap<Vec<String>, Arc<PictureOptions>> = HashMap::from([(Vec::new(), common.clone())]);
@@ -101,11 +106,27 @@ pub(crate) fn gather(
             }
         };
         let relative = relative_of(&row.input);
-        drafts.push(Draft { row, relative, common });
+        drafts.push(Draft { row, relative, common, line: Some(line) });
     }
     let named: Vec<(&ManifestRow, &Path)> = drafts.iter().map(|draft| (&draft.row, draft.relative.as_path())).collect();
     let ids = ids(&named)?;
-    let finish = |(index, (draft, id)): (usize, (Draft, String))| finish(draft, id, index, naming);
+    let folder = place_of(naming.folder);
+    let finish = |(index, (draft, id)): (usize, (Draft, String))| {
+        let line = draft.line.filter(|_| !naming.allow_outside);
+        let item = finish(draft, id, index, naming)?;
+        let outside = item.outputs.iter().find(|output| !place_of(&output.path).starts_with(&folder));
+        match (line, outside) {
+            (Some(line), Some(output)) => Err(Error::input(
+                manifest,
+                format!(
+                    "line {line}: {} lies outside of the folder {}; name a place in it, or allow this with --allow-outside",
+                    output.path.display(),
+                    naming.folder.display()
+                ),
+            )),
+            _ => Ok(item),
+        }
+    };
     let items = drafts.into_iter().zip(ids).enumerate().map(finish).collect::<Result<Vec<Item>>>()?;
     check_places(&items, manifest)?;
     check_order(&items)?;
@@ -153,7 +174,7 @@ pub(crate) fn ids_of_rows(rows: &[ManifestRow]) -> Result<Vec<String>> {
 }
 
 fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result<Item> {
-    let Draft { row, relative, common } = draft;
+    let Draft { row, relative, common, line: _ } = draft;
     let paths = match &row.output {
         Some(outputs) => outputs.paths().to_vec(),
         None => {
@@ -178,13 +199,12 @@ fn finish(draft: Draft, id: String, index: usize, naming: &Naming<'_>) -> Result
 
 /// Refuses outputs that would overwrite an input or another output.
 fn check_places(items: &[Item], manifest: &Path) -> Result<()> {
-    let inputs: HashSet<&Path> = items.iter().flat_map(Item::files_read).chain([manifest]).collect();
-    let inputs: HashSet<PathBuf> = inputs.into_iter().map(only_place_of).collect();
+    let inputs = Inputs::new(items.iter().flat_map(Item::files_read).chain([manifest]));
     let mut written: HashMap<PathBuf, &Item> = HashMap::new();
     for item in items {
         for output in &item.outputs {
             let (place, path) = (only_place_of(&output.path), output.path.display());
-            if inputs.contains(&place) {
+            if inputs.has(&output.path) {
                 return Err(Error::Usage(format!("{path} is an input; name another place for the output")));
             }
             if let Some(other) = written.insert(place, item) {
@@ -198,12 +218,6 @@ fn check_places(items: &[Item], manifest: &Path) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// The place of a file; in small letters on systems that do not tell small letters from capitals in names.
-fn only_place_of(path: &Path) -> PathBuf {
-    let place = place_of(path);
-    if cfg!(any(windows, target_os = "macos")) { place.to_string_lossy().to_lowercase().into() } else { place }
 }
 
 /// Refuses an order that cannot be kept: after a picture outside the group, or in a circle.

@@ -53,7 +53,8 @@ pub(crate) fn find(args: &BatchArgs, typed: &Typed) -> Result<Vec<Item>> {
         if flags.is_empty() { of_pictures(&args.picture) } else { of_pictures(&typed.picture_with(flags)?) }
     };
     let formats = check_formats(&args.formats)?;
-    let naming = Naming { folder: &args.output, template: &args.name, formats: &formats };
+    let naming =
+        Naming { folder: &args.output, template: &args.name, formats: &formats, allow_outside: args.allow_outside };
     let items = items::gather(found, manifest, rows, &options_with, &naming)?;
     let givers = Givers::new(&args.inputs, depth, &args.output);
     for output in items.iter().flat_map(|item| &item.outputs) {

@@ -52,6 +52,7 @@ pub(crate) fn exit_code(error: &Error) -> u8 {
         | Error::OutOfDeviceMemory { .. }
         | Error::OutOfMemory { .. }
         | Error::Vulkan { .. }
+        | Error::Threads { .. }
         | Error::Validation(_)
         | Error::Internal(_) => 1,
     }

@@ -1,7 +1,8 @@
-//! Ctrl-C and similar signals: the first one asks for an orderly end, a second Ctrl-C ends the process at once.
+//! Ctrl-C and similar signals: the first one asks for an orderly end, a second Ctrl-C ends the process at once. As long
+//! as a command has nothing to save and nothing to clear away, the first one ends it at once.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use signal_hook::consts::SIGINT;
 use signal_hook::low_level::unregister;
@@ -15,9 +16,61 @@ pub(crate) const EXIT_INTERRUPTED: u8 = 75;
 const EXIT_AT_ONCE: i32 = 130;
 
 #[cfg(unix)]
-const SIGNALS: [i32; 3] = [SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGUSR1];
+const SIGNALS: [i32; 4] =
+    [SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGUSR1, signal_hook::consts::SIGHUP];
 #[cfg(not(unix))]
 const SIGNALS: [i32; 2] = [SIGINT, signal_hook::consts::SIGTERM];
+
+/// Whether the first signal ends the process at once.
+static AT_ONCE: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// Prepares the process for signals: until a command listens, the first one ends it at once.
+///
+/// # Errors
+/// [`Error::Internal`] if no handler can be installed.
+pub(crate) fn prepare() -> Result<()> {
+    let at_once = Arc::new(AtomicBool::new(true));
+    let prepare = || -> std::io::Result<()> {
+        for signal in signals() {
+            flag::register_conditional_shutdown(signal, EXIT_INTERRUPTED.into(), Arc::clone(&at_once))?;
+        }
+        // Without a handler, a file that exceeds `ulimit -f` would kill the process. With one, the write fails instead.
+        #[cfg(unix)]
+        flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
+        Ok(())
+    };
+    prepare().map_err(|error| not_installed(&error))?;
+    // A second call fails, and there is none.
+    let _ = AT_ONCE.set(at_once);
+    Ok(())
+}
+
+/// The signals that ask for an end.
+fn signals() -> impl Iterator<Item = i32> {
+    SIGNALS.into_iter().filter(|&signal| !is_to_be_ignored(signal))
+}
+
+/// Whether the process was started to outlive its terminal, as by `nohup`.
+#[cfg(unix)]
+fn is_to_be_ignored(signal: i32) -> bool {
+    static HANGUP_IS_IGNORED: OnceLock<bool> = OnceLock::new();
+    signal == signal_hook::consts::SIGHUP
+        && *HANGUP_IS_IGNORED.get_or_init(|| {
+            let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+            let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+            let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+            ignored.is_some_and(|mask| mask & (1 << (signal - 1)) != 0)
+        })
+}
+
+#[cfg(not(unix))]
+fn is_to_be_ignored(_signal: i32) -> bool {
+    false
+}
+
+fn not_installed(error: &std::io::Error) -> Error {
+    Error::Internal(format!("the handlers of signals cannot be installed ({error})"))
+}
 
 /// Whether a signal asked for the work to end. All threads share it.
 #[derive(Debug, Default)]
@@ -38,12 +91,14 @@ struct Arming {
 }
 
 impl Interrupt {
-    /// Listens to the signals from now on.
+    /// Listens to the signals from now on: none ends the process at once any more.
     pub(crate) fn listen() -> Result<Self> {
         let interrupt = Self::default();
-        interrupt
-            .register()
-            .map_err(|error| Error::Internal(format!("the handlers of signals cannot be installed ({error})")))?;
+        interrupt.register().map_err(|error| not_installed(&error))?;
+        // Only now, so that no signal is missed.
+        if let Some(at_once) = AT_ONCE.get() {
+            at_once.store(false, Ordering::Relaxed);
+        }
         Ok(interrupt)
     }
 
@@ -51,17 +106,14 @@ impl Interrupt {
         // Registered before the flags: actions run in the order of registration, and the first Ctrl-C must find `armed`
         // still false.
         flag::register_conditional_shutdown(SIGINT, EXIT_AT_ONCE, Arc::clone(&self.armed))?;
-        for signal in SIGNALS {
+        for signal in signals() {
             flag::register(signal, Arc::clone(&self.requested))?;
         }
-        // Without a handler, a file that exceeds `ulimit -f` would kill the process. With one, the write fails instead.
-        #[cfg(unix)]
-        flag::register(signal_hook::consts::SIGXFSZ, Arc::default())?;
         self.register_arming(&mut self.arming())
     }
 
     fn register_arming(&self, arming: &mut Arming) -> std::io::Result<()> {
-        for signal in SIGNALS {
+        for signal in signals() {
             arming.actions.push(flag::register(signal, Arc::clone(&self.armed))?);
         }
         Ok(())
@@ -117,6 +169,16 @@ impl Interrupt {
         let _ = self.register_arming(&mut arming);
         if self.is_requested() {
             self.armed.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Nothing is left to be saved, so the next signal ends the process at once, as in the beginning.
+impl Drop for Interrupt {
+    fn drop(&mut self) {
+        self.begin_writing();
+        if let Some(at_once) = AT_ONCE.get() {
+            at_once.store(true, Ordering::Relaxed);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What the user sees and sends at the terminal: lines on stderr, data on stdout, progress, and signals.
 
 pub(crate) mod advice;
+pub(crate) mod aside;
 pub(crate) mod interrupt;
 pub(crate) mod progress;
 mod shown;

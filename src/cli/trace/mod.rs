@@ -19,7 +19,8 @@ pub(super) use self::capture::{Capture, CaptureRange};
 use self::device_track::DeviceTrack;
 pub(super) use self::traced::TraceInstruments;
 pub(super) use self::tracer::Tracer;
-use crate::cli::files::destination::{self, Overwrite};
+use crate::cli::files::destination::Overwrite;
+use crate::cli::files::guard::Inputs;
 use crate::error::{Error, NoDevice, Result};
 use crate::studio::Device;
 
@@ -42,7 +43,7 @@ pub(super) struct TraceArgs {
 /// [`Error::Usage`] if the file is one of `taken`, or exists and is not a trace of ours; [`Error::Output`] if it cannot
 /// be written.
 pub(super) fn begin_trace(path: &Path, taken: &[&Path], overwrite: Overwrite) -> Result<Tracer> {
-    if destination::is_one_of(&destination::place_of(path), taken) {
+    if Inputs::new(taken.iter().copied()).has(path) {
         let path = path.display();
         return Err(Error::Usage(format!("--trace {path}: it is an input or another output; name another file")));
     }

@@ -173,6 +173,13 @@ impl Tracer {
         partial.commit().map(|()| log.events)
     }
 
+    /// Ends the trace without a file, even if other threads still hold it.
+    pub(crate) fn discard(&self) {
+        if let Some(mut log) = self.log() {
+            log.file = None;
+        }
+    }
+
     fn log(&self) -> Option<MutexGuard<'_, Log>> {
         Some(self.shared.as_ref()?.log.lock().unwrap_or_else(PoisonError::into_inner))
     }

@@ -6,10 +6,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::thread;
 use std::time::Duration;
 
 use crate::shapes::ink::Ink;
+use crate::threads;
 
 /// Longest time that a drawing may take. Those that people draw take a few milliseconds.
 const DRAWING_TIME_MAX: Duration = Duration::from_millis(2_500);
@@ -39,14 +39,14 @@ pub(super) fn drawn_in_time(
     let state = Arc::new(AtomicU8::new(RUNNING));
     let (sender, receiver) = sync_channel(1);
     let of_thread = Arc::clone(&state);
-    let started = thread::Builder::new().name("svg".to_owned()).stack_size(STACK_BYTES).spawn(move || {
+    let started = threads::spawn_with_stack("svg", STACK_BYTES, move || {
         // Nobody may be there to take it.
         let _ = sender.send(draw());
         if of_thread.swap(ENDED, Ordering::AcqRel) == ABANDONED {
             GIVEN_UP.fetch_sub(1, Ordering::Relaxed);
         }
     });
-    started.map_err(|error| format!("the SVG cannot be drawn: no thread can be started ({error}); try again"))?;
+    started.map_err(|error| format!("the SVG cannot be drawn: {error}"))?;
     receiver.recv_timeout(DRAWING_TIME_MAX).unwrap_or_else(|error| {
         if error == RecvTimeoutError::Timeout {
             GIVEN_UP.fetch_add(1, Ordering::Relaxed);
@@ -60,6 +60,8 @@ pub(super) fn drawn_in_time(
 
 #[cfg(test)]
 mod tests {
+    use std::thread;
+
     use super::*;
 
     #[test]
@@ -73,7 +75,8 @@ mod tests {
                 let wait = Arc::clone(&wait);
                 drawn_in_time(move || Err(format!("{:?}", wait.lock().map(|wait| wait.recv().is_err()).is_ok())))
             };
-            let waiting: Vec<_> = (0..GIVEN_UP_MAX).map(|_| scope.spawn(draw)).collect();
+            let waiting: Vec<_> =
+                (0..GIVEN_UP_MAX).map(|_| threads::spawn_in(scope, draw).expect("it starts")).collect();
             waiting.into_iter().map(|waiting| waiting.join().expect("it does not panic")).collect()
         });
         let is_too_slow = |refusal: &Result<Vec<Ink>, String>| {

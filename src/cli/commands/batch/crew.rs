@@ -5,9 +5,10 @@ use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 use super::queue::Queue;
-use super::stages::{Done, Outlets, Pipeline, Ready, Report, unless_it_panics};
+use super::stages::{Done, Outlets, Pipeline, Ready, Report};
 use crate::cli::jobs::prepared::Evolved;
 use crate::cli::terminal::advice::why_no_vulkan;
+use crate::cli::terminal::aside::unless_it_panics;
 use crate::cli::terminal::milliseconds;
 use crate::engine::{self, Finished};
 use crate::error::{Error, Result};

@@ -60,14 +60,15 @@ mod tests {
             for number in 0..24_u64 {
                 let bytes = if number == 7 { 1_000 } else { 30 };
                 let (gate, inside, most) = (&gate, &inside, &most);
-                scope.spawn(move || {
+                let visit = move || {
                     let permit = gate.enter(bytes);
                     let now = inside.fetch_add(bytes, Ordering::SeqCst) + bytes;
                     most.fetch_max(if bytes == 30 { now } else { bytes - now }, Ordering::SeqCst);
                     std::thread::yield_now();
                     inside.fetch_sub(bytes, Ordering::SeqCst);
                     drop(permit);
-                });
+                };
+                crate::threads::spawn_in(scope, visit).expect("a test may start threads");
             }
         });
         // Three pictures of 30 bytes fit, and the one of 1,000 was alone.

@@ -54,7 +54,6 @@ pub(crate) fn make(args: &BatchArgs, typed: &Typed) -> ExitCode {
 
 /// The work, in order: find and check, evolve, report.
 fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
-    let interrupt = Interrupt::listen()?;
     let verbosity = args.messages.verbosity();
     let validation = if args.validate { Validation::On } else { Validation::Off };
     let computing = args.computing.check(validation)?;
@@ -62,7 +61,9 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
     if args.devices.devices.is_some() && typed.has("device") {
         return Err(Error::Usage("--devices also takes a single device; drop --device".to_owned()));
     }
+    // A manifest may come through a pipe that never ends, so signals are heard from here on.
     let items = list::find(args, typed)?;
+    let interrupt = Interrupt::listen()?;
     let all = items.len();
     let results = args.results.clone().unwrap_or_else(|| {
         let name = shard.map_or("results.jsonl".to_owned(), |shard| {

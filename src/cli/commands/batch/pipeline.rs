@@ -15,7 +15,7 @@ use rayon::ThreadPool;
 use super::crew::Crew;
 use super::existing::{self, Verdict};
 use super::queue::Queue;
-use super::stages::{Done, InFlight, Outlets, Pipeline, Ready, Report, Work, Worker, tell, unless_it_panics};
+use super::stages::{Done, InFlight, Outlets, Pipeline, Ready, Report, Work, Worker, tell};
 use crate::cli::files::destination::Destination;
 use crate::cli::files::{memory, outputs};
 use crate::cli::jobs::prepared::Prepared;
@@ -23,10 +23,11 @@ use crate::cli::jobs::row::{Row, Status};
 use crate::cli::list::Item;
 use crate::cli::terminal;
 use crate::cli::terminal::advice::why_no_vulkan;
+use crate::cli::terminal::aside::{self, Aside, unless_it_panics};
 use crate::error::{Error, Result};
 use crate::evolve::Ending;
 use crate::studio::{Device, Drawn};
-use crate::{output, photo};
+use crate::{output, photo, threads};
 
 /// How many pictures may wait to be evolved.
 const READ_AHEAD_MAX: usize = 16;
@@ -66,43 +67,61 @@ impl<'a> Pipeline<'a> {
         let (ready_in, ready_out) = sync_channel(in_flight);
         let (done_in, done_out) = sync_channel(self.io_threads.save);
         let (ready_out, done_out) = (Arc::new(Queue::new(ready_out)), Arc::new(Queue::new(done_out)));
-        for _ in 0..self.io_threads.load {
-            let (ready, reports) = (ready_in.clone(), reports.clone());
-            scope.spawn(move || self.read_all(&ready, &reports));
-        }
-        for worker in self.workers {
-            for crew in worker.crews() {
-                let ready = Arc::clone(&ready_out);
-                let outlets = Outlets { done: done_in.clone(), reports: reports.clone() };
-                scope.spawn(move || self.evolve_all(&worker.device, crew, &ready, &outlets));
-            }
-        }
-        for _ in 0..self.io_threads.save {
+        let save = || {
             let (done, reports) = (Arc::clone(&done_out), reports.clone());
-            scope.spawn(move || self.save_all(&done, &reports));
+            threads::spawn_in(scope, move || self.save_all(&done, &reports)).map(drop)
+        };
+        let evolve = |(worker, crew): (&'a Worker, Hands<'a>)| {
+            let ready = Arc::clone(&ready_out);
+            let outlets = Outlets { done: done_in.clone(), reports: reports.clone() };
+            threads::spawn_in(scope, move || self.evolve_all(&worker.device, crew, &ready, &outlets)).map(drop)
+        };
+        let read = || {
+            let (ready, reports) = (ready_in.clone(), reports.clone());
+            threads::spawn_in(scope, move || self.read_all(&ready, &reports)).map(drop)
+        };
+        let mut crews =
+            self.workers.iter().flat_map(|worker| worker.crews().into_iter().map(move |crew| (worker, crew)));
+        // One of each must start; where the system has no room for the others, these do their work, too.
+        if let Err(error) = save().and_then(|()| crews.next().map_or(Ok(()), evolve)).and_then(|()| read()) {
+            self.schedule.end();
+            let _ = reports.send(Report::Fatal(error));
+            return received;
         }
+        let _ = crews.try_for_each(evolve);
+        let _ = (1..self.io_threads.save).try_for_each(|_| save());
+        let _ = (1..self.io_threads.load).try_for_each(|_| read());
         received
     }
 
     /// The work of a thread that reads.
     fn read_all(&self, ready: &SyncSender<Ready<'a>>, reports: &Sender<Report>) {
+        // A decoder may need for ever, and must not keep a signal from ending the batch.
+        let aside = Aside::start("reading").ok();
         while let Some(number) = self.schedule.next() {
             if self.interrupt.is_requested() {
                 return self.schedule.end();
             }
             let item = &self.items[number];
             let mut row = self.row(item);
-            match unless_it_panics(|| self.read(item, &mut row, reports)) {
+            match unless_it_panics(|| self.read(item, &mut row, reports, aside.as_ref())) {
                 // The send cannot fail: the receiver lives as long as there are senders.
                 Ok(Some(work)) => drop(ready.send(Ready { item, work, row })),
                 Ok(None) => tell(reports, row),
+                Err(Error::Interrupted) => return self.schedule.end(),
                 Err(error) => self.fail(row, error, reports),
             }
         }
     }
 
     /// Reads a picture; none if there is nothing to do about it.
-    fn read(&self, item: &Item, row: &mut Row, reports: &Sender<Report>) -> Result<Option<Work<'a>>> {
+    fn read(
+        &self,
+        item: &Item,
+        row: &mut Row,
+        reports: &Sender<Report>,
+        aside: Option<&Aside<Prepared>>,
+    ) -> Result<Option<Work<'a>>> {
         let paths = || item.outputs.iter().map(|output| output.path.display().to_string()).collect();
         if existing::is_skipped(&item.outputs, self.on_exists)? {
             (row.status, row.output) = (Status::Skipped, paths());
@@ -111,7 +130,14 @@ impl<'a> Pipeline<'a> {
         check_is_file(&item.input)?;
         let options = item.options(self.tracer);
         let reading = self.gate.enter(photo::decoding_bytes(&item.input));
-        let prepared = Prepared::load(&options, &row.id)?;
+        let load = {
+            let (options, id) = (options.clone(), row.id.clone());
+            move || Prepared::load(&options, &id)
+        };
+        let prepared = match aside {
+            Some(aside) => aside.unless_interrupted(self.interrupt, load)?,
+            None => aside::unless_interrupted(self.interrupt, load)?,
+        };
         row.note_prepared(&prepared, &options);
         let memory_bytes = prepared.check(&options)?;
         // This must precede the next request for a permit: no thread may wait while it holds one.

@@ -2,9 +2,10 @@
 //! is removed.
 
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::cli::files::destination::{place_of, sweep};
+use crate::cli::files::destination::sweep;
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::inputs::{Depth, Givers};
 use crate::cli::list::{BatchArgs, Item, rows};
 use crate::error::{Error, Result};
@@ -12,24 +13,24 @@ use crate::output::{self, Journal};
 
 /// The places of all pictures that a batch reads or writes.
 pub(super) struct Taken<'a> {
-    places: HashSet<PathBuf>,
+    places: Inputs,
     givers: Givers<'a>,
 }
 
 impl<'a> Taken<'a> {
     pub(super) fn new(items: &[Item], args: &'a BatchArgs) -> Self {
         let depth = if args.recursive { Depth::Recursive } else { Depth::Flat };
-        let manifest = args.manifest.iter().map(PathBuf::as_path);
-        let read: HashSet<&Path> = items.iter().flat_map(Item::files_read).chain(manifest).collect();
+        let manifest = args.manifest.as_deref();
+        let read = items.iter().flat_map(Item::files_read).chain(manifest);
         let written = items.iter().flat_map(|item| &item.outputs).map(|output| output.path.as_path());
-        let places = read.into_iter().chain(written).map(place_of).collect();
+        let places = Inputs::new(read.chain(written));
         Self { places, givers: Givers::new(&args.inputs, depth, &args.output) }
     }
 
     /// Refuses the file of `flag` if it is one of these, or would count as a picture the next time.
     pub(super) fn check(&self, flag: &str, path: &Path) -> Result<()> {
         let path_told = path.display();
-        if self.places.contains(&place_of(path)) {
+        if self.places.has(path) {
             return Err(Error::Usage(format!(
                 "{flag}: {path_told} is read or written by the batch; name another file"
             )));

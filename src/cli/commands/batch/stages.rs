@@ -13,11 +13,11 @@ use crate::cli::jobs::row::Row;
 use crate::cli::jobs::watch::Watchers;
 use crate::cli::list::shard::Shard;
 use crate::cli::list::{IoThreads, Item, OnExists};
+use crate::cli::terminal::aside::unless_it_panics;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::trace::Tracer;
-use crate::error::{Error, Result};
+use crate::error::Error;
 use crate::evolve::Ending;
-use crate::guard;
 use crate::output;
 use crate::studio::{Device, Drawn};
 
@@ -141,13 +141,4 @@ impl<'a> Pipeline<'a> {
 /// Reports the row of a picture. The send cannot fail: the receiver listens until the last sender is gone.
 pub(super) fn tell(reports: &Sender<Report>, row: Row) {
     let _ = reports.send(Report::Row(Box::new(row)));
-}
-
-/// Does some work on a picture. A panic becomes an error, since one picture must not end a batch. What a decoder makes
-/// of a broken file was caught before (`guard.rs`), so this one is a bug.
-pub(super) fn unless_it_panics<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
-    guard::caught(work).unwrap_or_else(|panicked| {
-        let place = &panicked.place;
-        Err(Error::Internal(format!("a picture made the program panic at {place}: {panicked}")))
-    })
 }

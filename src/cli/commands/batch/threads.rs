@@ -1,17 +1,19 @@
 //! Decides how many pictures evolve on which device, and how many threads read and save.
 
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::ThreadPool;
 
 use super::stages::{InFlight, Worker};
 use crate::cli::args::computing::Computing;
 use crate::cli::list::{BatchArgs, IoThreads};
 use crate::cli::values::in_range;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::studio::Device;
 use crate::vk::DeviceKind;
 
 /// Most of these threads, unless more are asked for.
 const IO_THREADS_USUAL: usize = 8;
+/// Threads that a batch needs at least besides those that evolve.
+const OTHER_THREADS: usize = 3;
 /// Most pictures that evolve at the same time on a device.
 const IN_FLIGHT_MAX: u64 = 4_096;
 /// Most lanes of a GPU, unless more are asked for. Its memory may hold fewer.
@@ -44,7 +46,7 @@ pub(super) fn workers(args: &BatchArgs, computing: &Computing, item_count: usize
             })),
             None => {
                 let count = most(threads);
-                InFlight::Pools((0..count).map(|_| pool((threads / count).max(1))).collect::<Result<_>>()?)
+                InFlight::Pools(pools(count, (threads / count).max(1))?)
             }
         };
         Ok(Worker { device, in_flight })
@@ -52,9 +54,14 @@ pub(super) fn workers(args: &BatchArgs, computing: &Computing, item_count: usize
     devices.into_iter().map(worker).collect()
 }
 
-fn pool(threads: usize) -> Result<ThreadPool> {
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|error| Error::Internal(format!("threads cannot be started ({error})")))
+/// A pool for each picture in flight. Where the system starts fewer threads, there are fewer pictures in flight.
+fn pools(count: usize, threads: usize) -> Result<Vec<ThreadPool>> {
+    let mut pools = crate::threads::pools(count, threads);
+    if pools.len() < count {
+        // Each pool needs a thread that hands it pictures, and others must read and save.
+        pools.truncate((pools.len().saturating_sub(OTHER_THREADS) / 2).max(1));
+    }
+    if pools.is_empty() { Err(crate::threads::none()) } else { Ok(pools) }
 }
 
 #[cfg(test)]

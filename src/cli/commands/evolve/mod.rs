@@ -3,7 +3,7 @@
 mod options;
 mod summary;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -12,6 +12,7 @@ use self::options::{EvolveOptions, Files, Mode};
 use crate::cli::args::computing;
 use crate::cli::files::curve_file::{self, CurveFile, EndedCurve};
 use crate::cli::files::destination::{self, Destination};
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::outputs::{self, EncodedFile};
 use crate::cli::files::{memory, replacing};
 use crate::cli::jobs::options::PictureOptions;
@@ -20,7 +21,7 @@ use crate::cli::jobs::recorder::Recorder;
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::jobs::watch::Watchers;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::cli::terminal::{self, Verbosity, advice};
+use crate::cli::terminal::{self, Verbosity, advice, aside};
 use crate::cli::trace::{self, Capture, CaptureRange, TraceArgs};
 use crate::error::Result;
 use crate::evolve::Ending;
@@ -62,11 +63,13 @@ impl Run<'_> {
     fn evolve_traced(mut self, trace_args: &TraceArgs) -> Result<()> {
         let options = &mut self.options;
         if let (Some(path), Mode::Work) = (&trace_args.trace, options.mode) {
-            let taken = options.files_written().chain(options.picture.settings.init_file());
-            let taken: Vec<&Path> = taken.chain(options.picture.picture_inputs()).collect();
+            let taken: Vec<&Path> = options.files_written().chain(options.picture.files_read()).collect();
             options.picture.tracer = trace::begin_trace(path, &taken, options.files.overwrite)?;
         }
-        self.evolve(trace_args.capture)?;
+        if let failure @ Err(_) = self.evolve(trace_args.capture) {
+            self.options.picture.tracer.discard();
+            return failure;
+        }
         let Self { options: EvolveOptions { picture, .. }, interrupt, row } = self;
         let Some(path) = trace_args.trace.as_ref().filter(|_| picture.tracer.is_on()) else { return Ok(()) };
         let events = interrupt.while_writing(|| picture.tracer.finish())?;
@@ -91,7 +94,12 @@ impl Run<'_> {
         let capture = capture.map(|range| trace::begin_capture(range, &device)).transpose()?;
         row.device = Some(device.label().to_owned());
 
-        let prepared = Prepared::load(picture, &row.id)?;
+        // Before there is anything to save, a signal ends this at once.
+        let load = {
+            let (picture, id) = (picture.clone(), row.id.clone());
+            move || Prepared::load(&picture, &id)
+        };
+        let prepared = aside::unless_interrupted(interrupt, load)?;
         row.note_prepared(&prepared, picture);
         let memory_bytes = prepared.check(picture)?;
         memory::check(memory_bytes)?;
@@ -107,14 +115,17 @@ impl Run<'_> {
             return Ok(());
         }
 
+        let folders = files.save_run.iter().map(|save_run| save_run.path_of(0)).collect::<Vec<_>>();
+        destination::sweep_beside(options.files_written().chain(folders.iter().map(PathBuf::as_path)));
         let mut watchers = Watchers { interrupt, recorder: begin_record(files, &prepared)? };
         let keep = if files.curves.is_empty() { Keep::Nothing } else { Keep::Curve };
         let evolved = row.note_evolution(prepared.evolve(picture, &device, &mut watchers, keep))?;
         let began = Instant::now();
-        let status = if evolved.ending.is_complete() { Status::Complete } else { Status::Partial };
+        let ending = evolved.ending;
+        let status = if ending.is_complete() { Status::Complete } else { Status::Partial };
         write(options, &prepared, evolved, interrupt, &mut row.output)?;
         // If snapshots could not be written, that is reported after the result has been saved.
-        row.output.extend(watchers.recorder.map(Recorder::outcome).transpose()?);
+        row.output.extend(watchers.recorder.map(|recorder| recorder.outcome(&ending)).transpose()?);
         row.output.extend(capture.map(|capture| end_capture(&capture, picture)).transpose()?);
         row.save_ms = terminal::milliseconds(began.elapsed());
         row.status = status;
@@ -127,7 +138,7 @@ impl Run<'_> {
 
 /// Checks, before anything is read, that all files can be written, and that none is written twice or is an input.
 fn check_places(options: &EvolveOptions) -> Result<()> {
-    let inputs = options.picture.picture_inputs();
+    let inputs = Inputs::new(options.picture.files_read());
     destination::check_writable(options.destinations(), &inputs)?;
     curve_file::check_writable(&options.files.curves, options.destinations(), &inputs)?;
     let mut written = options.files_written();

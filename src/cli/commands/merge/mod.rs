@@ -12,9 +12,11 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use crate::cli::files::destination;
+use crate::cli::files::guard::{Inputs, place_of};
 use crate::cli::list;
 use crate::cli::list::rows::{self, ResultRow, Rows};
 use crate::cli::terminal;
+use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -91,7 +93,8 @@ fn merge_all(args: &MergeArgs) -> Result<ExitCode> {
     if is_stdout(&args.output) {
         terminal::write_stdout(&bytes)?;
     } else {
-        output::write_atomically(&args.output, &bytes)?;
+        destination::sweep_beside(std::iter::once(args.output.as_path()));
+        Interrupt::listen()?.while_writing(|| output::write_atomically(&args.output, &bytes))?;
     }
     if !args.quiet {
         table::summary(&rows).iter().for_each(|line| terminal::say(line));
@@ -131,7 +134,7 @@ fn tell_missing(missing: &[&str], expected_count: usize) {
 fn result_files(paths: &[PathBuf], output: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let own_name = output.file_name().filter(|name| !is_stdout(output) && !is_name_of_batch(name));
-    let own_place = destination::place_of(output);
+    let own_place = place_of(output);
     for path in paths {
         if !path.is_dir() {
             files.push(path.clone());
@@ -139,9 +142,7 @@ fn result_files(paths: &[PathBuf], output: &Path) -> Result<Vec<PathBuf>> {
         }
         let entries = fs::read_dir(path).map_err(|error| Error::input(path, format!("cannot be read ({error})")))?;
         let names = entries.flatten().map(|entry| entry.file_name()).filter(|name| is_results_name(name));
-        let is_own = |name: &OsString| {
-            Some(name.as_os_str()) == own_name && destination::place_of(&path.join(name)) == own_place
-        };
+        let is_own = |name: &OsString| Some(name.as_os_str()) == own_name && place_of(&path.join(name)) == own_place;
         let names = names.filter(|name| !is_own(name));
         let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
         names.sort_by(|a, b| natord::compare(a, b));
@@ -183,10 +184,7 @@ fn check_output(args: &MergeArgs, files: &[PathBuf]) -> Result<()> {
     if is_stdout(path) {
         return Ok(());
     }
-    let inputs: Vec<&Path> = files.iter().chain(&args.manifests).map(PathBuf::as_path).collect();
-    if destination::is_one_of(&destination::place_of(path), &inputs) {
-        return Err(Error::Usage(format!("{} is an input; name another file for the output", path.display())));
-    }
+    Inputs::new(files.iter().chain(&args.manifests).map(PathBuf::as_path)).refuse([path.as_path()])?;
     output::check_writable(path)?;
     if args.force || !path.is_file() || holds_rows(path) {
         return Ok(());

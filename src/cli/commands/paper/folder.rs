@@ -4,7 +4,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::page::{GENERATOR, Page};
-use crate::cli::files::destination::Overwrite;
+use crate::cli::files::destination::{self, Overwrite};
+use crate::cli::files::guard::Inputs;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
 use crate::output;
@@ -18,6 +19,7 @@ const HEAD_BYTES: u64 = 512;
 pub(super) struct Folder<'a> {
     root: PathBuf,
     metadata: Metadata,
+    inputs: Inputs,
     interrupt: &'a Interrupt,
 }
 
@@ -27,9 +29,12 @@ impl<'a> Folder<'a> {
     /// # Errors
     /// [`Error::Usage`] if it is a file, or holds other files and `--force` was not given; [`Error::Output`] if it
     /// cannot be created.
-    pub(super) fn open(root: &Path, overwrite: Overwrite, interrupt: &'a Interrupt) -> Result<Self> {
+    pub(super) fn open(root: &Path, overwrite: Overwrite, inputs: Inputs, interrupt: &'a Interrupt) -> Result<Self> {
         if root.is_file() {
             return Err(Error::Usage(format!("{} is a file; name a folder", root.display())));
+        }
+        if root.is_dir() {
+            destination::sweep(root)?;
         }
         if overwrite == Overwrite::Refuse && root.is_dir() && !is_empty_or_ours(root)? {
             return Err(Error::Usage(format!(
@@ -37,10 +42,16 @@ impl<'a> Folder<'a> {
                 root.display()
             )));
         }
+        if inputs.are_in(root) {
+            return Err(Error::Usage(format!(
+                "{} holds the pictures that are read; name another folder",
+                root.display()
+            )));
+        }
         create(root, root)?;
         output::check_writable(&root.join("index.html"))?;
         let software = format!("smalti {}", env!("CARGO_PKG_VERSION"));
-        Ok(Self { root: root.to_owned(), metadata: vec![("Software".to_owned(), software)], interrupt })
+        Ok(Self { root: root.to_owned(), metadata: vec![("Software".to_owned(), software)], inputs, interrupt })
     }
 
     /// Writes a file; `name` is its path in the folder.
@@ -50,6 +61,7 @@ impl<'a> Folder<'a> {
     pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         self.interrupt.check()?;
         let path = self.root.join(name);
+        self.inputs.refuse([path.as_path()])?;
         if let Some(parent) = path.parent() {
             create(parent, &path)?;
         }

@@ -20,6 +20,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
+use crate::cli::files::guard::Inputs;
 use crate::cli::mosaics::{MosaicsArgs, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::{terminal, values};
@@ -110,7 +111,6 @@ pub(crate) fn make(args: &PaperArgs) -> ExitCode {
 }
 
 fn try_make(args: &PaperArgs) -> Result<()> {
-    let interrupt = Interrupt::listen()?;
     let verbosity = args.mosaics.verbosity();
     let images = match &args.images {
         None if args.name.needs_pictures() => {
@@ -119,7 +119,11 @@ fn try_make(args: &PaperArgs) -> Result<()> {
         Some(folder) if args.name.needs_pictures() => pictures::in_folder(folder, verbosity)?,
         _ => Vec::new(),
     };
-    let folder = Folder::open(&args.output, args.mosaics.overwrite(), &interrupt)?;
+    let interrupt = Interrupt::listen()?;
+    let given = args.images.as_deref().filter(|_| args.name.needs_pictures()).map(std::fs::read_dir);
+    let given: Vec<PathBuf> = given.into_iter().flatten().flatten().flatten().map(|entry| entry.path()).collect();
+    let inputs = Inputs::new(given.iter().map(PathBuf::as_path));
+    let folder = Folder::open(&args.output, args.mosaics.overwrite(), inputs, &interrupt)?;
     let device = args.mosaics.computing.begin(verbosity)?;
     let began = Instant::now();
     let workshop = Workshop::new(&device, &interrupt, args.mosaics.progress());

@@ -8,7 +8,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::cli::files::destination::Overwrite;
+use crate::cli::files::destination::{self, Overwrite};
+use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
 use crate::output;
 
@@ -42,9 +43,12 @@ pub(super) fn write(folder: &Path, files: &BTreeMap<String, String>, overwrite: 
     for (name, text) in files {
         list.files.entry(name.clone()).or_default().push(hash(text.as_bytes()));
     }
-    write_list(folder, &list)?;
+    destination::sweep(folder)?;
+    let interrupt = Interrupt::listen()?;
+    interrupt.while_writing(|| write_list(folder, &list))?;
     for (name, text) in files {
-        output::write_atomically_soon(&folder.join(name), text.as_bytes())?;
+        interrupt.check()?;
+        interrupt.while_writing(|| output::write_atomically_soon(&folder.join(name), text.as_bytes()))?;
     }
     for (name, hashes) in &old.files {
         let path = folder.join(name);
@@ -55,7 +59,12 @@ pub(super) fn write(folder: &Path, files: &BTreeMap<String, String>, overwrite: 
         }
     }
     list.files = files.iter().map(|(name, text)| (name.clone(), vec![hash(text.as_bytes())])).collect();
-    write_list(folder, &list)
+    interrupt.while_writing(|| write_list(folder, &list))
+}
+
+/// The names of everything that [`write`] writes.
+pub(super) fn all_names(files: &BTreeMap<String, String>) -> impl Iterator<Item = &str> {
+    files.keys().map(String::as_str).chain([LIST])
 }
 
 fn old_list(folder: &Path, overwrite: Overwrite) -> Result<List> {

@@ -3,6 +3,7 @@
 use clap::ArgAction;
 use clap::parser::ValueSource;
 
+use super::scripts;
 use crate::cli::args::typed::Typed;
 use crate::error::{Error, Result};
 
@@ -34,6 +35,11 @@ pub(super) fn of(typed: &Typed, name: &str, kept: &[&str]) -> Result<Vec<String>
                 let value = value.to_string_lossy();
                 Error::Usage(format!("--{long}: a script can only contain UTF-8 text, and {value} is not; rename it"))
             })?;
+            if !scripts::can_hold(value) {
+                return Err(Error::Usage(format!(
+                    "--{long}: a script can only contain text without control characters and line breaks; rename {value:?}"
+                )));
+            }
             flags.push(format!("--{long}={value}"));
         }
     }

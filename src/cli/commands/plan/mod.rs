@@ -14,7 +14,8 @@ use clap::{ArgGroup, Args};
 
 use self::scripts::{Plan, quoted};
 use crate::cli::args::typed::Typed;
-use crate::cli::files::destination::Overwrite;
+use crate::cli::files::destination::{Destination, Overwrite};
+use crate::cli::files::guard::{self, Inputs};
 use crate::cli::list::shard::{self, SHARD_COUNT_MAX};
 use crate::cli::list::{self, BatchArgs, Item, ManifestRow};
 use crate::cli::terminal::{self, Verbosity};
@@ -94,11 +95,18 @@ fn write(args: &PlanArgs, typed: &Typed) -> Result<()> {
     let groups: Vec<Option<&str>> = rows.iter().map(|row| row.group.as_deref()).collect();
     let picture_s = picture_s(args, &items);
     let shard_count = shard_count(args, items.len(), picture_s)?.min(shard::unit_count(&groups));
+    let mut flags = flags::of(typed, "plan", &KEPT_FLAGS)?;
+    let folder = guard::place_of(&args.batch.output);
+    let is_outside = |output: &Destination| !guard::place_of(&output.path).starts_with(&folder);
+    if !args.batch.allow_outside && items.iter().flat_map(|item| &item.outputs).any(is_outside) {
+        // `--name` leads there, which is the user's own word; in the shards it has become rows of a manifest.
+        flags.push("--allow-outside".to_owned());
+    }
     let plan = Plan {
         work_folder: work_folder()?,
         folder: text(&args.into)?,
         output_folder: text(&args.batch.output)?,
-        flags: flags::of(typed, "plan", &KEPT_FLAGS)?,
+        flags,
         item_count: items.len(),
         shard_count,
     };
@@ -116,6 +124,9 @@ fn write(args: &PlanArgs, typed: &Typed) -> Result<()> {
         files.insert(plan.shard_name(index), manifest(&rows)?);
     }
     if !args.batch.dry_run {
+        let inputs = Inputs::new(items.iter().flat_map(Item::files_read).chain(args.batch.manifest.as_deref()));
+        let written: Vec<PathBuf> = files::all_names(&files).map(|name| args.into.join(name)).collect();
+        inputs.refuse(written.iter().map(PathBuf::as_path))?;
         files::write(&args.into, &files, overwrite)?;
     }
     if args.batch.messages.verbosity() > Verbosity::Quiet {
@@ -187,11 +198,14 @@ fn work_folder() -> Result<String> {
 
 /// The path as text, which a script needs.
 fn text(path: &Path) -> Result<String> {
-    let text = path.to_str().filter(|text| !text.contains(['\n', '"', '\\']));
-    text.map(str::to_owned).ok_or_else(|| {
-        let sentence = "a script can only contain names in UTF-8 without line breaks, quotes or backslashes; rename it";
+    let text = path.to_str().filter(|text| !text.contains(['"', '\\']) && scripts::can_hold(text));
+    let text = text.ok_or_else(|| {
+        let sentence = "a script can only contain names in UTF-8 without control characters, line breaks, double quotes or \
+                        backslashes; rename it";
         Error::input(path, sentence)
-    })
+    })?;
+    // It would be taken for a flag.
+    Ok(if text.starts_with('-') { format!("./{text}") } else { text.to_owned() })
 }
 
 /// Says what was planned, how long it will take, and how to run it.

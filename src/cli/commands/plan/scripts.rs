@@ -119,6 +119,19 @@ exit "$code"
         )
     }
 
+    /// The arguments for the command of a container, in which Kubernetes puts variables in the place of `$(NAME)`, and
+    /// one dollar in the place of two.
+    fn arguments_in_container(&self, indent: &str) -> String {
+        let twice = |text: &String| text.replace('$', "$$");
+        let names = Self {
+            folder: twice(&self.folder),
+            output_folder: twice(&self.output_folder),
+            flags: self.flags.iter().map(twice).collect(),
+            ..self.clone()
+        };
+        names.arguments(indent)
+    }
+
     /// An indexed job of Kubernetes.
     pub(super) fn kubernetes(&self) -> String {
         let heading = self.heading(
@@ -130,7 +143,7 @@ exit "$code"
         let mut script = String::new();
         let command = format!(
             "{OWN_FLAGS_ONLY}\nindex=$((JOB_COMPLETION_INDEX + 1))\nshard=$(printf '%0{digits}d' \"$index\")\nexec smalti {}",
-            self.arguments("  ")
+            self.arguments_in_container("  ")
         );
         for line in command.lines() {
             let _ = writeln!(script, "              {line}");
@@ -196,7 +209,9 @@ spec:
              # One job at a time is the default, since smalti uses all processors by itself.",
         );
         let (count, digits) = (self.shard_count, self.digits());
-        let (work_folder, folder) = (quoted(&self.work_folder), quoted(&self.folder));
+        let work_folder = quoted(&self.work_folder);
+        // Parallel adds to a log whose name begins with a plus.
+        let log = quoted(&format!("{}/parallel.log", self.absolute(&self.folder)));
         let arguments = self.arguments("        ");
         // Absolute, since a remote machine starts in another folder.
         let script = quoted(&format!("{}/parallel.sh", self.absolute(&self.folder)));
@@ -211,9 +226,12 @@ if [ "$1" = --shard ]; then
     exec "${{SMALTI:-smalti}}" {arguments}
 fi
 command -v parallel >/dev/null || {{ echo "parallel.sh: install GNU parallel" >&2; exit 1; }}
-log={folder}/parallel.log
-seq 1 {count} | parallel --will-cite --quote --jobs 1 --line-buffer --joblog "$log" --termseq TERM,60000,KILL,25 "$@" \
-    sh {script} --shard {{}}
+log={log}
+# Parallel would read a name such as {{}} or {{= =}} in a command, so the script's own goes through the environment.
+SMALTI_PLAN_SCRIPT={script}
+export SMALTI_PLAN_SCRIPT
+seq 1 {count} | parallel --will-cite --env SMALTI_PLAN_SCRIPT --jobs 1 --line-buffer --joblog "$log" --termseq TERM,60000,KILL,25 "$@" \
+    'sh "$SMALTI_PLAN_SCRIPT" --shard' {{}}
 # Columns 7 and 8 are exit code and signal of a shard. 75: run it again, as for one that a signal ended or that was not begun;
 # 3: some pictures failed.
 awk 'NR > 1 {{ if ($8 != 0 || $7 == 75) again = 1; else if ($7 == 3) some = 3; else if ($7 != 0) worst = $7 }}
@@ -226,6 +244,12 @@ awk 'NR > 1 {{ if ($8 != 0 || $7 == 75) again = 1; else if ($7 == 3) some = 3; e
     fn absolute(&self, path: &str) -> String {
         if path.starts_with('/') { path.to_owned() } else { format!("{}/{path}", self.work_folder) }
     }
+}
+
+/// Whether a script can contain a text: no shell, no scheduler and no YAML sees the end of a line in it, or anything
+/// that is not printed.
+pub(super) fn can_hold(text: &str) -> bool {
+    !text.chars().any(|char| char.is_control() || "\u{2028}\u{2029}\u{FEFF}\u{FFFE}\u{FFFF}".contains(char))
 }
 
 /// A word, quoted for a shell.

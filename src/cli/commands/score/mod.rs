@@ -14,6 +14,7 @@ use crate::metrics::{Picture, Reference, Score};
 use crate::model::Rgb;
 use crate::photo::{self, Background, Photo, ReadOptions};
 use crate::studio::color;
+use crate::threads;
 
 /// Exit code when some of the pictures could not be scored.
 const EXIT_SOME_FAILED: u8 = 3;
@@ -129,7 +130,7 @@ pub(crate) fn score(args: &ScoreArgs) -> ExitCode {
     if args.flicker {
         return flicker::score(args);
     }
-    match score_all(args) {
+    match threads::start(None).and_then(|()| score_all(args)) {
         Ok(exit_code) => exit_code,
         Err(error) => {
             terminal::error(&advice::sentence(&error));

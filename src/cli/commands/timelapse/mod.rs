@@ -10,6 +10,8 @@ use std::process::ExitCode;
 pub(crate) use self::options::TimelapseArgs;
 use self::options::TimelapseOptions;
 use crate::archive;
+use crate::cli::files::destination;
+use crate::cli::files::guard::Inputs;
 use crate::cli::files::snapshots::{self, Snapshot};
 use crate::cli::film::{self, Camera, End, Film, Shown};
 use crate::cli::terminal::interrupt::{EXIT_INTERRUPTED, Interrupt};
@@ -35,13 +37,14 @@ pub(crate) fn make(args: &TimelapseArgs) -> ExitCode {
 
 /// The work, in order: check, open every output, draw and encode, give the files their names.
 fn animate(options: &TimelapseOptions) -> Result<End> {
-    let interrupt = Interrupt::listen()?;
     options.computing.start_threads()?;
     let snapshots = snapshots::list(&options.folder)?;
     let chosen = frames::choose(&snapshots, options.spacing, options.frame_count);
+    let inputs = Inputs::new(snapshots.iter().map(|snapshot| snapshot.path.as_path()));
     let snapshots: Vec<&Snapshot> = chosen.into_iter().map(|index| &snapshots[index]).collect();
-    film::check_writable(&options.outputs)?;
+    film::check_writable(&options.outputs, &inputs)?;
     let first = archive::read(&snapshots[0].path)?.population;
+    let interrupt = Interrupt::listen()?;
     let shown =
         Shown { long_side_px: options.long_side_px, background: options.background, film_count: options.outputs.len() };
     let mut camera = Camera::open(shown, &options.computing.select()?, &first)?;
@@ -51,6 +54,7 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
     for output in &options.outputs {
         film::check_replaceable(&output.path, &provenance.key, options.overwrite)?;
     }
+    destination::sweep_beside(options.outputs.iter().map(|output| output.path.as_path()));
     if has_alpha && !options.is_quiet {
         options.outputs.iter().filter(|output| !output.format.has_alpha()).for_each(film::say_shown_over_black);
     }

@@ -8,6 +8,7 @@ use super::options::VideoOptions;
 use super::plan::Planned;
 use super::store::Store;
 use crate::archive;
+use crate::cli::files::destination;
 use crate::cli::film::{self, AnimationProvenance, Camera, End, Film, Shown};
 use crate::cli::terminal::Verbosity;
 use crate::cli::terminal::interrupt::Interrupt;
@@ -82,6 +83,7 @@ pub(super) fn make(
     let last_cs = 100 / frames_per_s;
     let timing = Timing { frame_count: planned.len() as u32, frames_per_s, last_cs, plays: 0 };
     let provenance = provenance(options, sequence);
+    destination::sweep_beside(options.films.iter().map(|output| output.path.as_path()));
     let frames = camera.frames(timing, has_alpha(planned));
     if frames.has_alpha && options.pictures.verbosity > Verbosity::Quiet {
         options.films.iter().filter(|output| !output.format.has_alpha()).for_each(film::say_shown_over_black);

@@ -11,7 +11,8 @@ use crate::archive::Archive;
 use crate::cli::files::destination;
 use crate::cli::files::outputs::{self, EncodedFile};
 use crate::cli::jobs::row::Row;
-use crate::cli::terminal::{self, Verbosity, milliseconds};
+use crate::cli::terminal::interrupt::Interrupt;
+use crate::cli::terminal::{self, Verbosity, aside, milliseconds};
 use crate::error::{Error, Result};
 use crate::evolve::cells::{self, Budget};
 use crate::evolve::held::Held;
@@ -50,6 +51,7 @@ pub(super) struct Shooter<'a> {
     planned: &'a [Planned],
     store: &'a Store,
     device: &'a Device,
+    interrupt: &'a Interrupt,
     painter: Box<dyn Painter>,
     last: Option<Last>,
     /// The held pixels after the frame with this number.
@@ -66,9 +68,10 @@ impl<'a> Shooter<'a> {
         planned: &'a [Planned],
         store: &'a Store,
         device: &'a Device,
+        interrupt: &'a Interrupt,
     ) -> Result<Self> {
         let painter = device.open_painter()?;
-        Ok(Self { options, planned, store, device, painter, last: None, held: None })
+        Ok(Self { options, planned, store, device, interrupt, painter, last: None, held: None })
     }
 
     /// Evolves a frame and writes its files, or only those that are missing; returns its row.
@@ -186,7 +189,8 @@ impl<'a> Shooter<'a> {
     }
 
     fn load(&self, frame: &Planned) -> Result<Job> {
-        let job = Job::load(&frame.input, &frame_options(self.options, &frame.input).settings)?;
+        let options = frame_options(self.options, &frame.input);
+        let job = aside::unless_interrupted(self.interrupt, move || Job::load(&options.input, &options.settings))?;
         let expected = frame.population.decisive("input_sha256");
         if expected != job.input_sha256.as_str() {
             return Err(Error::input(&frame.input, "changed while frames were made; run the same command again"));

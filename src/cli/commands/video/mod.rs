@@ -24,7 +24,7 @@ use self::plan::Planned;
 use self::show::{FrameRow, Totals, Watcher};
 use self::store::Store;
 use crate::cli::args::computing;
-use crate::cli::files::destination;
+use crate::cli::files::guard::{Inputs, place_of};
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::Progress;
@@ -69,7 +69,10 @@ fn shoot_traced(mut options: VideoOptions, args: &VideoArgs, totals: &mut Totals
         let taken: Vec<&Path> = options.inputs.iter().chain(&args.outputs).map(PathBuf::as_path).collect();
         options.pictures.tracer = trace::begin_trace(path, &taken, options.overwrite)?;
     }
-    shoot_all(&options, args, totals)?;
+    if let failure @ Err(_) = shoot_all(&options, args, totals) {
+        options.pictures.tracer.discard();
+        return failure;
+    }
     if options.pictures.tracer.is_on() { options.pictures.tracer.finish().map(|_| ()) } else { Ok(()) }
 }
 
@@ -77,16 +80,22 @@ fn shoot_traced(mut options: VideoOptions, args: &VideoArgs, totals: &mut Totals
 fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> Result<()> {
     let interrupt = Interrupt::listen()?;
     options.computing.start_threads()?;
-    animation::check_writable(&options.films)?;
+    let given = Inputs::new(options.inputs.iter().map(PathBuf::as_path).chain(options.pictures.settings.files_read()));
+    animation::check_writable(&options.films, &given)?;
     let store = Store::new(options);
     let frames = input::find(options, &options.populations.join("input"), &interrupt)?;
     check_places(options, &frames.paths)?;
+    let inputs = Inputs::new(frames.paths.iter().map(PathBuf::as_path).chain(options.pictures.settings.files_read()));
+    inputs.refuse(options.films.iter().map(|film| film.path.as_path()).chain(args.trace.as_deref()))?;
     let device = options.computing.select()?;
     trace::trace_device(&options.pictures.tracer, &device);
     if options.pictures.verbosity > Verbosity::Quiet {
         computing::say_device(&device);
     }
     let planned = plan::plan(options, &frames.paths, &interrupt)?;
+    for frame in &planned {
+        inputs.refuse(store.destinations(frame.number)?.iter().map(|output| output.path.as_path()))?;
+    }
     store.check(&planned)?;
     let sequence = Sequence { planned: &planned, input_frames_per_s: frames.frames_per_s };
     film::check_replaceable(options, sequence)?;
@@ -94,7 +103,7 @@ fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> R
     totals.frames_planned = planned.len();
     totals.shots = planned.chunk_by(|one, other| one.shot == other.shot).count();
 
-    let mut shooter = Shooter::open(options, &planned, &store, &device)?;
+    let mut shooter = Shooter::open(options, &planned, &store, &device, &interrupt)?;
     let mut watcher = Watcher::begin(&interrupt, Progress::new(options.progress), planned.len());
     let made = planned.iter().try_for_each(|frame| {
         interrupt.check()?;
@@ -145,11 +154,11 @@ fn make_frame(shooter: &mut Shooter<'_>, store: &Store, frame: &Planned, watcher
 
 /// Refuses to write frames into the folder that frames are read from.
 fn check_places(options: &VideoOptions, inputs: &[PathBuf]) -> Result<()> {
-    let places = options.folder.iter().chain([&options.populations]).map(|folder| destination::place_of(folder));
+    let places = options.folder.iter().chain([&options.populations]).map(|folder| place_of(folder));
     let places: Vec<_> = places.collect();
     let of_input = inputs.iter().filter_map(|input| input.parent()).map(|folder| {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        destination::place_of(folder)
+        place_of(folder)
     });
     match of_input.into_iter().find(|folder| places.contains(folder)) {
         Some(folder) => {

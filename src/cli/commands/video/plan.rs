@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use super::options::{Leash, Limit, VideoOptions, WarmStart};
 use crate::cli::jobs::options::PictureOptions;
 use crate::cli::jobs::prepared::Prepared;
-use crate::cli::terminal;
 use crate::cli::terminal::interrupt::Interrupt;
+use crate::cli::terminal::{self, aside};
 use crate::error::{Error, Result};
 use crate::evolve::held::Glance;
 use crate::studio::Provenance;
@@ -81,8 +81,11 @@ pub(super) fn plan(options: &VideoOptions, paths: &[PathBuf], interrupt: &Interr
         let sentence = format!("--frames {}..{}: there are {} frames", span.start, span.end, paths.len());
         return Err(Error::Usage(sentence));
     }
-    let see = |path: &PathBuf| interrupt.check().and_then(|()| see(options, path));
-    let seen: Vec<FrameRead> = paths[span.clone()].par_iter().map(see).collect::<Result<_>>()?;
+    let read = {
+        let (options, paths) = (options.clone(), paths[span.clone()].to_vec());
+        move || paths.par_iter().map(|path| see(&options, path)).collect::<Result<Vec<FrameRead>>>()
+    };
+    let seen = aside::unless_interrupted(interrupt, read)?;
     let mut planned: Vec<Planned> = Vec::new();
     for (index, one) in seen.iter().enumerate() {
         let number = span.start + index;
