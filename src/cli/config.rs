@@ -12,7 +12,7 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgMatches, Command};
 use toml::{Table, Value};
 
-use crate::cli::files::guard;
+use crate::cli::files::places;
 use crate::error::{Error, Result};
 use crate::studio::{SETTINGS_BYTES_MAX, read_text, toml_mistake};
 
@@ -44,7 +44,7 @@ struct File<'a> {
 
 impl<'a> File<'a> {
     fn read(path: &'a Path) -> Result<Self> {
-        guard::note_flags_read(path);
+        places::note_flags_read(path);
         let text = read_text(path, "a file of flags", SETTINGS_BYTES_MAX)?;
         let table = text.parse().map_err(|error: toml::de::Error| {
             let mistake = toml_mistake(&text, &error);

@@ -254,7 +254,8 @@ fn what_cannot_be_meant_is_refused_before_anything_is_written() {
         ("one -o one --format png", "is an input"),
         ("one -o one --name b.{ext}", "would be taken for a picture of one"),
         (". --recursive -o one/.. --name {index}.{ext}", "would be taken for a picture of ."),
-        ("one --manifest over.jsonl -o out", "is an input"),
+        ("one --manifest over.jsonl -o out", "lies outside of the folder out"),
+        ("one --manifest over.jsonl --allow-outside -o out", "is an input"),
         ("--manifest same.jsonl -o out", "would both be written to"),
         ("--manifest minus.jsonl -o out", "writes files"),
         ("--manifest weird.jsonl -o out", "threads is no flag that decides a picture"),
@@ -268,7 +269,7 @@ fn what_cannot_be_meant_is_refused_before_anything_is_written() {
         ("one -o out --io-threads 0:1", "LOAD:SAVE"),
         ("one -o out --results -", "--json"),
         ("one -o out --results one/a.png", "is read or written by the batch"),
-        ("--manifest over.jsonl -o out --results over.jsonl", "is read or written by the batch"),
+        ("--manifest over.jsonl --allow-outside -o out --results over.jsonl", "is read or written by the batch"),
         ("one -o out --devices cpu --device cpu", "drop --device"),
     ] {
         let before = tree(&workshop, ".");

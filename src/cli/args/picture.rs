@@ -10,7 +10,7 @@ use super::cells::CellsArgs;
 use super::look::{LookArgs, masks};
 use super::paper::{ColorModeName, PaperSchemeArgs};
 use super::preset::{self, PresetChoice};
-use crate::cli::files::guard;
+use crate::cli::files::places;
 use crate::cli::values;
 use crate::error::{Error, Result};
 use crate::evolve::style::Style;
@@ -126,7 +126,7 @@ impl PictureArgs {
         }
         let recipe = match preset {
             Some(PresetChoice::File(path)) => {
-                guard::note_flags_read(path);
+                places::note_flags_read(path);
                 recipe.over(&Preset::read(path)?.recipe())
             }
             _ => recipe,

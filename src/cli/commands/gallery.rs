@@ -12,7 +12,7 @@ use std::time::Instant;
 use clap::Args;
 
 use crate::cli::files::destination::{self, Overwrite};
-use crate::cli::files::guard::Inputs;
+use crate::cli::files::places::Inputs;
 use crate::cli::files::sheet::sheet;
 use crate::cli::mosaics::{Made, MosaicsArgs, PaperRecipe, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;

@@ -13,7 +13,7 @@ use crate::archive::{self, Archive};
 use crate::cli::args::computing::{self, Computing, ComputingArgs};
 use crate::cli::args::look::LookArgs;
 use crate::cli::files::destination::{self, Destination, Overwrite};
-use crate::cli::files::guard::Inputs;
+use crate::cli::files::places::Inputs;
 use crate::cli::files::{memory, outputs, replacing};
 use crate::cli::jobs::row::Status;
 use crate::cli::terminal::interrupt::Interrupt;

@@ -11,7 +11,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::destination::{Destination, Overwrite};
-use super::guard::{Inputs, place_of};
+use super::places::{Inputs, place_of};
 use super::story::Story;
 use crate::archive::KEY_DIGITS;
 use crate::cli::terminal::interrupt::Interrupt;

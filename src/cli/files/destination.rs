@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 
-use super::guard::{Inputs, place_of};
+use super::places::{Inputs, place_of};
 use crate::error::{Error, Result};
 use crate::output;
 use crate::photo::WEBP_SIDE_MAX_PX;

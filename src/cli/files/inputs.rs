@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use glob::{MatchOptions, Pattern};
 
-use super::guard::place_of;
 use super::left_out::LeftOut;
+use super::places::place_of;
 use crate::error::{Error, Result};
 use crate::photo;
 

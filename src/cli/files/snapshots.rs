@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::destination::Overwrite;
-use super::guard::{Inputs, place_of};
+use super::places::{Inputs, place_of};
 use crate::archive;
 use crate::cli::values::in_range;
 use crate::error::{Error, Result};

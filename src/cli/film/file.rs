@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use crate::cli::files::guard::{Inputs, place_of};
+use crate::cli::files::places::{Inputs, place_of};
 use crate::error::{Error, Result};
 use crate::output;
 

@@ -20,7 +20,7 @@ use self::device_track::DeviceTrack;
 pub(super) use self::traced::TraceInstruments;
 pub(super) use self::tracer::Tracer;
 use crate::cli::files::destination::Overwrite;
-use crate::cli::files::guard::Inputs;
+use crate::cli::files::places::Inputs;
 use crate::error::{Error, NoDevice, Result};
 use crate::studio::Device;
 

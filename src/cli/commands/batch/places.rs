@@ -5,8 +5,8 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use crate::cli::files::destination::sweep;
-use crate::cli::files::guard::Inputs;
 use crate::cli::files::inputs::{Depth, Givers};
+use crate::cli::files::places::Inputs;
 use crate::cli::list::{BatchArgs, Item, rows};
 use crate::error::{Error, Result};
 use crate::output::{self, Journal};

@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 
 use crate::cli::files::destination;
-use crate::cli::files::guard::{Inputs, place_of};
+use crate::cli::files::places::{Inputs, place_of};
 use crate::cli::list;
 use crate::cli::list::rows::{self, ResultRow, Rows};
 use crate::cli::terminal;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::page::{GENERATOR, Page};
 use crate::cli::files::destination::{self, Overwrite};
-use crate::cli::files::guard::Inputs;
+use crate::cli::files::places::Inputs;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
 use crate::output;

@@ -20,7 +20,7 @@ use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::files::guard::Inputs;
+use crate::cli::files::places::Inputs;
 use crate::cli::mosaics::{MosaicsArgs, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::{terminal, values};

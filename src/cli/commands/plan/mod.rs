@@ -15,7 +15,7 @@ use clap::{ArgGroup, Args};
 use self::scripts::{Plan, quoted};
 use crate::cli::args::typed::Typed;
 use crate::cli::files::destination::{Destination, Overwrite};
-use crate::cli::files::guard::{self, Inputs};
+use crate::cli::files::places::{self, Inputs};
 use crate::cli::list::shard::{self, SHARD_COUNT_MAX};
 use crate::cli::list::{self, BatchArgs, Item, ManifestRow};
 use crate::cli::terminal::{self, Verbosity};
@@ -96,8 +96,8 @@ fn write(args: &PlanArgs, typed: &Typed) -> Result<()> {
     let picture_s = picture_s(args, &items);
     let shard_count = shard_count(args, items.len(), picture_s)?.min(shard::unit_count(&groups));
     let mut flags = flags::of(typed, "plan", &KEPT_FLAGS)?;
-    let folder = guard::place_of(&args.batch.output);
-    let is_outside = |output: &Destination| !guard::place_of(&output.path).starts_with(&folder);
+    let folder = places::place_of(&args.batch.output);
+    let is_outside = |output: &Destination| !places::place_of(&output.path).starts_with(&folder);
     if !args.batch.allow_outside && items.iter().flat_map(|item| &item.outputs).any(is_outside) {
         // `--name` leads there, which is the user's own word; in the shards it has become rows of a manifest.
         flags.push("--allow-outside".to_owned());

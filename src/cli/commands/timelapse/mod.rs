@@ -11,7 +11,7 @@ pub(crate) use self::options::TimelapseArgs;
 use self::options::TimelapseOptions;
 use crate::archive;
 use crate::cli::files::destination;
-use crate::cli::files::guard::Inputs;
+use crate::cli::files::places::Inputs;
 use crate::cli::files::snapshots::{self, Snapshot};
 use crate::cli::film::{self, Camera, End, Film, Shown};
 use crate::cli::terminal::interrupt::{EXIT_INTERRUPTED, Interrupt};

@@ -24,7 +24,7 @@ use self::plan::Planned;
 use self::show::{FrameRow, Totals, Watcher};
 use self::store::Store;
 use crate::cli::args::computing;
-use crate::cli::files::guard::{Inputs, place_of};
+use crate::cli::files::places::{Inputs, place_of};
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::Progress;
