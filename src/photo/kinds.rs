@@ -113,7 +113,7 @@ const BRANDS: &[(&[u8; 4], Kind)] = &[
     (b"crx ", foreign("camera raw (CR3)", RAW)),
 ];
 
-/// What a file that begins with these bytes is: [`SIGNATURE_BYTES`] of them, or all. Camera raw that is stored as TIFF
+/// What a file that begins with these bytes is: `SIGNATURE_BYTES` of them, or all. Camera raw that is stored as TIFF
 /// shows in directories that may lie anywhere, so only the whole file tells it from other TIFF for certain.
 #[must_use]
 pub fn kind_of(bytes: &[u8]) -> Kind {
