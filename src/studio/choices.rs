@@ -8,7 +8,7 @@ use super::look::Mask;
 use super::presets::PaperPreset;
 use crate::evolve::style::Style;
 use crate::evolve::{ColorMode, OnDry};
-use crate::model::{Blend, Population, Rgb};
+use crate::model::{Backdrop, Blend, Population, Rgb};
 use crate::shapes::Shader;
 
 /// How to evolve.
@@ -91,7 +91,7 @@ pub(crate) struct Choices {
     pub style: Option<Style>,
     pub colors: Option<Colors>,
     pub color_mode: Option<ColorMode>,
-    pub background: Option<Rgb>,
+    pub background: Option<Backdrop>,
     pub weight: Option<WeightSource>,
     pub init: Option<InitSource>,
     pub masks: Vec<Mask>,

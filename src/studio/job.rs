@@ -30,7 +30,10 @@ pub(crate) struct Job {
     pub input_sha256: String,
     /// What was ignored in the input, one sentence each.
     pub warnings: Vec<String>,
+    /// The colour behind the tiles; black if nothing is.
     pub background: Rgb,
+    /// Whether nothing lies behind the tiles although the picture is opaque.
+    pub is_bare: bool,
     pub fly_count: usize,
     /// The scheme with what depends on files: in the paper's, the masks that flies wear and the palette of their
     /// colours.
@@ -78,7 +81,7 @@ impl Job {
         threads::start(None)?;
         let init = settings.init.as_ref().map(population).transpose()?;
         let of_init = init.as_ref().map(|population| population.background.color());
-        let asked_for = settings.background.or(of_init);
+        let asked_for = settings.background.map(Backdrop::color).or(of_init);
         let Fitted { target, palette, original_size_px, sha256, warnings } =
             Fitted::new(source, settings, asked_for.unwrap_or_default())?;
         let dress = dress(settings, init.as_deref())?;
@@ -105,8 +108,10 @@ impl Job {
             SchemeSettings::Cells(cells) if asked_for.is_none() => cells.ground(&target, grout),
             _ => asked_for.unwrap_or_default(),
         };
+        let is_bare = settings.background == Some(Backdrop::Transparent) && target.transparent().is_none();
         Ok(Self {
             fly_count,
+            is_bare,
             target,
             original_size_px,
             input_sha256: sha256,
@@ -188,11 +193,11 @@ impl Job {
 
     /// These flies as a population of this picture.
     pub(crate) fn population(&self, flies: Vec<Fly>) -> Population {
-        let is_cut = self.target.transparent().is_some();
+        let is_open = self.is_bare || self.target.transparent().is_some();
         Population {
             width_px: self.target.width_px(),
             height_px: self.target.height_px(),
-            background: if is_cut { Backdrop::Transparent } else { self.background.into() },
+            background: if is_open { Backdrop::Transparent } else { self.background.into() },
             grout: self.grout,
             masks: self.masks(),
             flies,

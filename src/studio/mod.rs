@@ -68,4 +68,4 @@ pub(crate) use self::provenance::{
 };
 pub(crate) use self::settings::{SchemeSettings, Settings};
 pub(crate) use self::text_file::{SETTINGS_BYTES_MAX, read_text, text_of, toml_mistake};
-pub(crate) use self::words::{color, color_count, grout_color};
+pub(crate) use self::words::{backdrop, color, color_count, grout_color};

@@ -19,7 +19,7 @@ use crate::evolve::style::{ClassStyle, Ground, GuideKind, Style};
 use crate::model::cells::rules::{CANDIDATES_MAX, CLASSES_MAX};
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::model::{Blend, Rgb};
+use crate::model::{Backdrop, Blend};
 use crate::shapes::Shader;
 
 /// Fixed-point one of lengths over d.
@@ -38,7 +38,7 @@ pub(crate) struct Preset {
     target_sae: Option<u64>,
     colors: Typed<Colors>,
     color_mode: Option<ColorModeName>,
-    background: Typed<Rgb>,
+    background: Typed<Backdrop>,
     masks: Vec<PathBuf>,
     shader: Typed<Shader>,
     blend: Option<BlendName>,
@@ -131,9 +131,9 @@ impl FromText for Colors {
     }
 }
 
-impl FromText for Rgb {
+impl FromText for Backdrop {
     fn from_text(text: &str) -> Result<Self, String> {
-        words::color(text)
+        words::backdrop(text)
     }
 }
 

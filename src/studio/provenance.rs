@@ -113,7 +113,8 @@ impl Provenance {
         }
         decisive.insert("width_px".to_owned(), job.target.width_px().into());
         decisive.insert("height_px".to_owned(), job.target.height_px().into());
-        decisive.insert("background".to_owned(), hexadecimal(&job.background).into());
+        let background = if job.is_bare { "none".to_owned() } else { hexadecimal(&job.background) };
+        decisive.insert("background".to_owned(), background.into());
         decisive.extend(specific);
         Self::of(decisive)
     }

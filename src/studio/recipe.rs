@@ -15,7 +15,7 @@ use crate::evolve::{ColorMode, OnDry};
 use crate::model::cells::rules::CANDIDATES_MAX;
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::model::{Blend, Population, Rgb};
+use crate::model::{Backdrop, Blend, Population, Rgb};
 use crate::photo::COLOR_COUNT_MAX;
 use crate::shapes::Shader;
 
@@ -246,11 +246,13 @@ impl Recipe {
         self
     }
 
-    /// The colour behind the tiles and behind transparent pixels. By default that of the population to begin with, else
-    /// that of the style; and what is transparent stays so, but not in the paper's scheme.
+    /// The colour behind the tiles and behind transparent pixels, or [`Backdrop::Transparent`]: then the mosaic is
+    /// transparent where no tile is, which counts as black while it evolves. By default the colour is that of the
+    /// population to begin with, else that of the style; and what is transparent stays so, but not in the paper's
+    /// scheme.
     #[must_use]
-    pub fn background(mut self, color: Rgb) -> Self {
-        self.choices.background = Some(color);
+    pub fn background(mut self, background: impl Into<Backdrop>) -> Self {
+        self.choices.background = Some(background.into());
         self
     }
 

@@ -11,7 +11,7 @@ use super::parameters::contradiction;
 use super::recipe::Recipe;
 use crate::error::Result;
 use crate::evolve::PaperScheme;
-use crate::model::{Blend, Rgb};
+use crate::model::{Backdrop, Blend};
 use crate::photo::CutShort;
 
 /// Longer side in px that pictures are reduced to.
@@ -61,7 +61,7 @@ pub(crate) struct Settings {
     /// Longer side in px that the picture is reduced to.
     pub long_side_px: u32,
     /// `None` means the one of `init`, else that of the style.
-    pub background: Option<Rgb>,
+    pub background: Option<Backdrop>,
     pub weight: Option<WeightSource>,
     pub init: Option<InitSource>,
     /// What is done about pictures that end too early.
@@ -141,10 +141,10 @@ impl Settings {
         self.weight_file().into_iter().chain(self.init_file()).chain(palette).chain(masks)
     }
 
-    /// Whether transparent pixels of the picture stay so: the paper knows only opaque pictures, and a background that
-    /// was asked for is meant to show.
+    /// Whether transparent pixels of the picture stay so: the paper knows only opaque pictures, and a colour that was
+    /// asked for is meant to show.
     pub(super) fn keeps_transparency(&self) -> bool {
-        matches!(self.scheme, SchemeSettings::Cells(_)) && self.background.is_none()
+        matches!(self.scheme, SchemeSettings::Cells(_)) && !matches!(self.background, Some(Backdrop::Color(_)))
     }
 }
 

@@ -2,7 +2,7 @@
 //! would be right.
 
 use super::choices::{Colors, GroutColor};
-use crate::model::Rgb;
+use crate::model::{Backdrop, Rgb};
 use crate::photo::COLOR_COUNT_MAX;
 
 /// A colour: `black`, `white`, or six hexadecimal digits with or without `#`.
@@ -17,6 +17,17 @@ pub(crate) fn color(text: &str) -> Result<Rgb, String> {
     let packed = u32::from_str_radix(digits, 16).ok().filter(|_| is_hexadecimal);
     let [_, r, g, b] = packed.ok_or("expected black, white or RRGGBB in hexadecimal")?.to_be_bytes();
     Ok([r, g, b])
+}
+
+/// What lies behind the tiles: `none`, or a colour.
+pub(crate) fn backdrop(text: &str) -> Result<Backdrop, String> {
+    match text {
+        "none" => Ok(Backdrop::Transparent),
+        _ => {
+            let expected = |_| "expected none, black, white or RRGGBB in hexadecimal".to_owned();
+            color(text).map(Backdrop::Color).map_err(expected)
+        }
+    }
 }
 
 /// `full`, or a whole number of colours.

@@ -179,3 +179,41 @@ fn a_video_of_a_cut_out_is_over_black_and_says_so() {
     assert!(ran.stderr.contains("a.mp4 cannot be transparent, so the mosaic is shown over black"), "{}", ran.stderr);
     assert!(!ran.stderr.contains("a.gif cannot"), "{}", ran.stderr);
 }
+
+#[test]
+fn a_background_of_none_leaves_clear_what_no_tile_covers_and_changes_no_tile() {
+    let workshop = Workshop::new();
+    for scheme in ["-n 40 --evals 900", "--style spray -n 40 --evals 900", "--scheme paper -n 20 --births 200"] {
+        let outputs = |name: &str| format!("-o {name}.png -o {name}.svg -o {name}.npz --json -q --force {scheme}");
+        let row = |name: &str, background: &str| {
+            let ran = workshop.run(&format!("evolve photo.png {} --background {background}", outputs(name)));
+            assert_eq!(ran.code, Some(0), "{scheme}: {}", ran.stderr);
+            serde_json::from_slice::<serde_json::Value>(&ran.stdout).expect("a row is JSON")
+        };
+        let (black, none) = (row("black", "black"), row("none", "none"));
+        assert_eq!((&black["sae"], &black["evals"]), (&none["sae"], &none["evals"]), "{scheme}");
+        assert_ne!(black["key"], none["key"], "{scheme}: other bytes have another key");
+        let [black, none] =
+            ["black.png", "none.png"].map(|name| image::open(workshop.path(name)).unwrap().into_rgba8());
+        let mut clear = 0;
+        for (over, alone) in black.pixels().zip(none.pixels()) {
+            let [r, g, b, a] = alone.0;
+            let over_black = [r, g, b].map(|channel| ((u32::from(channel) * u32::from(a) + 127) / 255) as u8);
+            assert_eq!([over[0], over[1], over[2], over[3]], [over_black[0], over_black[1], over_black[2], 255]);
+            clear += u32::from(a < 255);
+        }
+        assert!(clear > 0, "{scheme}: every pixel is covered whole, so nothing was tried");
+        let flies = ["black.npz", "none.npz"].map(|name| archive::read(&workshop.path(name)).unwrap().population.flies);
+        assert_eq!(flies[0], flies[1], "{scheme}");
+        let [black, none] = ["black.svg", "none.svg"].map(|name| String::from_utf8(workshop.read(name)).unwrap());
+        assert!(black.lines().count() > none.lines().count(), "{scheme}: the SVG has a background");
+        let ran = workshop.run("render black.npz -o drawn.png --background none --force");
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        assert!(workshop.read("drawn.png").len() > 100);
+        let drawn = image::open(workshop.path("drawn.png")).unwrap().into_rgba8();
+        let clear_drawn = drawn.pixels().filter(|pixel| pixel[3] < 255).count();
+        assert_eq!(clear_drawn as u32, clear, "{scheme}: drawn again");
+    }
+    let ran = workshop.run("evolve photo.png -o x.png --background nothing");
+    assert!(ran.code == Some(2) && ran.stderr.contains("expected none, black, white or RRGGBB"), "{}", ran.stderr);
+}

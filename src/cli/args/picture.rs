@@ -15,8 +15,8 @@ use crate::cli::values;
 use crate::error::{Error, Result};
 use crate::evolve::style::Style;
 use crate::evolve::{ColorMode, OnDry};
-use crate::model::{Blend, Rgb};
-use crate::studio::{Colors, Preset, Recipe, Scheme, Settings, color, color_count};
+use crate::model::{Backdrop, Blend};
+use crate::studio::{Colors, Preset, Recipe, Scheme, Settings, backdrop, color_count};
 
 /// The flags.
 #[derive(Clone, Debug, Args)]
@@ -36,10 +36,11 @@ pub(crate) struct PictureArgs {
     /// Palette that picture and tiles are held to: .gpl, .pal, .hex (lines of RRGGBB), or the colours of a picture
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     pub palette: Option<PathBuf>,
-    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB [default: as in --init or the
-    /// style, or black; what is transparent stays so, but not with --scheme paper]
-    #[arg(long, value_name = "COLOR", value_parser = color, help_heading = "Picture")]
-    pub background: Option<Rgb>,
+    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB; or none, and the mosaic is
+    /// transparent where no tile is [default: as in --init or the style, or black; what is transparent stays so, but
+    /// not with --scheme paper]
+    #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Picture")]
+    pub background: Option<Backdrop>,
     /// Map that tells where likeness matters, a picture with the proportions of IN: an error counts 16 times as much
     /// where the map is white as where it is black [default: alike everywhere]
     #[arg(long, value_name = "MAP", help_heading = "Picture")]

@@ -22,9 +22,9 @@ use crate::cli::values;
 use crate::error::{Error, Result};
 use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
 use crate::model::target::TARGET_SIDE_MAX_PX;
-use crate::model::{Backdrop, Blend, Grout, Population, Rgb};
+use crate::model::{Backdrop, Blend, Grout, Population};
 use crate::studio::{
-    Device, Drawn, Dress, KEEPS_MASKS, Look, Provenance, SUPERSAMPLING_MAX, Told, View, color, drawing_bytes,
+    Device, Drawn, Dress, KEEPS_MASKS, Look, Provenance, SUPERSAMPLING_MAX, Told, View, backdrop, drawing_bytes,
     hexadecimal, population_sha256,
 };
 use crate::vk::Validation;
@@ -57,10 +57,10 @@ pub(crate) struct RenderArgs {
     /// Longer side of the written picture, 1 to 65,535 px [default: as evolved]
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
     pub output_size: Option<u64>,
-    /// Colour behind the tiles: black, white or RRGGBB [default: as stored, which may be transparent; .jpg is then over
-    /// black]
-    #[arg(long, value_name = "COLOR", value_parser = color, help_heading = "Picture")]
-    pub background: Option<Rgb>,
+    /// Colour behind the tiles: black, white or RRGGBB; or none [default: as stored, which may be none; .jpg is then
+    /// over black]
+    #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Picture")]
+    pub background: Option<Backdrop>,
     /// Samples along each side of a pixel, 1 to 16 [default: 1 as evolved, 4 and more at another size]
     #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Picture")]
     pub supersample: Option<u64>,
@@ -91,7 +91,7 @@ struct RenderOptions {
     /// Longer side of the written picture in px; `None` writes it as evolved.
     output_long_side_px: Option<u32>,
     /// `None` takes the background of the population.
-    background: Option<Rgb>,
+    background: Option<Backdrop>,
     /// Masks that the tiles wear instead of their own, if any.
     look: Option<Look>,
     /// `None` chooses by the size.
@@ -262,7 +262,7 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
 
 /// The population with the look that the options ask for. Every change is part of its key.
 fn adapted(mut population: Population, options: &RenderOptions) -> Result<Population> {
-    population.background = options.background.map_or(population.background, Backdrop::Color);
+    population.background = options.background.unwrap_or(population.background);
     if let Some(look) = &options.look {
         let Dress { masks, layers_by_run } = look.dress()?;
         let worn = PaperScheme { masks: layers_by_run, ..PaperScheme::default() };

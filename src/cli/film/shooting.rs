@@ -15,7 +15,7 @@ use crate::cli::files::memory;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::{Progress, Stage, short_time};
 use crate::error::{Error, Result};
-use crate::model::{Backdrop, Canvas, Mosaic, Painter, Population, Rgb};
+use crate::model::{Backdrop, Canvas, Mosaic, Painter, Population};
 use crate::photo::{Frames, Timing};
 use crate::studio::{Device, estimate_bytes, usual_supersampling};
 use crate::threads;
@@ -36,7 +36,7 @@ pub(crate) struct Shown {
     /// Longer side of the frames in px; `None` draws them as evolved.
     pub long_side_px: Option<u32>,
     /// `None` takes the background of the populations, which may be transparent.
-    pub background: Option<Rgb>,
+    pub background: Option<Backdrop>,
     pub film_count: usize,
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Camera {
     size_px: (u32, u32),
     pub canvas: Canvas,
     supersampling: u32,
-    background: Option<Rgb>,
+    background: Option<Backdrop>,
 }
 
 /// Draws the populations and gives each frame to all films. Returns each film with its outcome.
@@ -148,7 +148,7 @@ impl Camera {
         if (population.width_px, population.height_px) != self.size_px {
             return Err(Error::input(path, "differs in size from the first population; remove it"));
         }
-        population.background = self.background.map_or(population.background, Backdrop::from);
+        population.background = self.background.unwrap_or(population.background);
         self.painter.draw(&population, &self.canvas, self.supersampling)
     }
 }

@@ -48,7 +48,7 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
     let shown =
         Shown { long_side_px: options.long_side_px, background: options.background, film_count: options.outputs.len() };
     let mut camera = Camera::open(shown, &options.computing.select()?, &first)?;
-    let has_alpha = options.background.is_none() && first.background == Backdrop::Transparent;
+    let has_alpha = options.background.unwrap_or(first.background) == Backdrop::Transparent;
     let frames = camera.frames(options.timing(snapshots.len()), has_alpha);
     let provenance = provenance::of_animation(options, &snapshots, &frames)?;
     for output in &options.outputs {

@@ -11,10 +11,10 @@ use crate::cli::film::{AnimationFile, AnimationFormat, FRAMES_PER_S_MAX};
 use crate::cli::terminal::progress::ProgressKind;
 use crate::cli::values::{self, in_range};
 use crate::error::{Error, Result};
-use crate::model::Rgb;
+use crate::model::Backdrop;
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::photo::{GIF_FRAMES_PER_S_MAX, Timing};
-use crate::studio::color;
+use crate::studio::backdrop;
 use crate::vk::Validation;
 
 /// Longest time in seconds that the last frame may be shown. Its hundredths must fit into 16 bits.
@@ -40,9 +40,10 @@ pub(crate) struct TimelapseArgs {
     /// Longer side of the frames, 1 to 65,535 px; every mosaic is drawn anew at that size [default: as evolved]
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Output")]
     pub output_size: Option<u64>,
-    /// Colour behind the tiles: black, white or RRGGBB [default: as evolved]
-    #[arg(long, value_name = "COLOR", value_parser = color, help_heading = "Output")]
-    pub background: Option<Rgb>,
+    /// Colour behind the tiles: black, white or RRGGBB; or none, except for .mp4 and .webm, which are then over black
+    /// [default: as evolved]
+    #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Output")]
+    pub background: Option<Backdrop>,
     /// Replace outputs that the same command would not have written
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -82,7 +83,7 @@ pub(super) struct TimelapseOptions {
     /// Longer side of the frames in px; `None` draws them as evolved.
     pub long_side_px: Option<u32>,
     /// `None` takes the background of the snapshots.
-    pub background: Option<Rgb>,
+    pub background: Option<Backdrop>,
     pub overwrite: Overwrite,
     pub frames_per_s: u16,
     /// Most frames; `None` lets the spacing decide.

@@ -9,6 +9,7 @@ use crate::archive;
 use crate::cli::files::snapshots::Snapshot;
 use crate::cli::film::AnimationProvenance;
 use crate::error::Result;
+use crate::model::Backdrop;
 use crate::photo::Frames;
 use crate::studio::{SOFTWARE, hexadecimal};
 
@@ -34,7 +35,10 @@ pub(super) fn of_animation(
         "run_key": run_key,
         "width_px": width_px,
         "height_px": height_px,
-        "background": options.background.map(|color| hexadecimal(&color)),
+        "background": options.background.map(|background| match background {
+            Backdrop::Color(color) => hexadecimal(&color),
+            Backdrop::Transparent => "none".to_owned(),
+        }),
         "spacing": match options.spacing { Spacing::Error => "error", Spacing::Births => "births", Spacing::Snapshots => "snapshots" },
         "frames_per_s": timing.frames_per_s,
         "last_cs": timing.last_cs,

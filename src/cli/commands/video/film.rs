@@ -57,7 +57,9 @@ fn provenance(options: &VideoOptions, sequence: Sequence<'_>) -> AnimationProven
 
 /// Whether some frame may be transparent.
 fn has_alpha(planned: &[Planned]) -> bool {
-    planned.iter().any(|frame| !frame.population.decisive("transparent_sha256").is_null())
+    let is_open =
+        |told: &Provenance| !told.decisive("transparent_sha256").is_null() || told.decisive("background") == "none";
+    planned.iter().any(|frame| is_open(&frame.population))
 }
 
 /// Makes the animations that were asked for; returns their paths.
