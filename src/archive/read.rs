@@ -23,6 +23,8 @@ use crate::photo;
 
 /// Most bytes of a column: eight per fly and an array header.
 const COLUMN_BYTES_MAX: u64 = 8 * FLY_COUNT_MAX as u64 + ARRAY_HEADER_BYTES_MAX as u64 + 16;
+/// Most bytes that are taken from a pipe.
+const PIPE_BYTES_MAX: u64 = 1 << 30;
 /// Most bytes of `meta.json`.
 const HEADER_BYTES_MAX: u64 = 1 << 20;
 
@@ -141,12 +143,22 @@ impl Members<BufReader<File>> {
     fn open(path: &Path) -> Result<Self, String> {
         let unreadable = |error: io::Error| photo::why_unreadable(&error);
         let file = File::open(path).map_err(unreadable)?;
+        let found = file.metadata().map_err(unreadable)?;
         // A folder can be opened; reading it would fail with a message of the zip reader.
-        if file.metadata().map_err(unreadable)?.is_dir() {
+        if found.is_dir() {
             return Err(unreadable(io::ErrorKind::IsADirectory.into()));
         }
+        let file = if found.is_file() { file } else { spooled(file).map_err(unreadable)? };
         Self::of(BufReader::new(file))
     }
+}
+
+/// What comes through a pipe, as a file without a name: the list of members is at the end.
+fn spooled(pipe: File) -> io::Result<File> {
+    let mut file = tempfile::tempfile()?;
+    io::copy(&mut pipe.take(PIPE_BYTES_MAX), &mut file)?;
+    file.rewind()?;
+    Ok(file)
 }
 
 impl<R: Read + Seek> Members<R> {

@@ -3,7 +3,10 @@
 
 use std::borrow::Cow;
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 use std::time::Duration;
+
+use clap::builder::{PathBufValueParser, TypedValueParser};
 
 use crate::error::{Error, Result};
 use crate::model::target::TARGET_SIDE_MAX_PX;
@@ -49,6 +52,14 @@ pub(crate) fn table_cell(text: &str) -> Cow<'_, str> {
     let may_be_formula = text.len() > 1 && text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n']);
     if may_be_formula && !is_plain_number { Cow::Owned(format!("'{text}")) } else { Cow::Borrowed(text) }
 }
+
+/// An input: a path, or `-` for stdin.
+pub(crate) fn input() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(|path| if path.as_os_str() == "-" { PathBuf::from(STDIN) } else { path })
+}
+
+/// What the system calls stdin. It is opened as any other file.
+const STDIN: &str = "/dev/stdin";
 
 /// A number with or without decimals, such as `1` or `0.5`. The flag itself checks whether it is finite and in range.
 pub(crate) fn number(text: &str) -> Result<f64, String> {

@@ -289,3 +289,28 @@ fn devices_are_listed_for_people_and_for_programs() {
     assert!(devices.iter().all(|device| device["missing"].is_array() && device["limits"].is_object()));
     assert!(!list["auto"]["device"].is_null());
 }
+
+#[cfg(unix)]
+#[test]
+fn a_dash_as_the_input_is_what_comes_through_a_pipe() {
+    use std::io::Write;
+    use std::process::Stdio;
+
+    let workshop = Workshop::new();
+    assert_eq!(workshop.run("evolve photo.png -o named.png -o named.npz -n 20 --evals 500").code, Some(0));
+    for (line, name) in [
+        ("evolve - -o piped.png -o piped.npz -n 20 --evals 500", "photo.png"),
+        ("render - -o drawn.png", "named.npz"),
+        ("score - named.png --json", "photo.png"),
+    ] {
+        let mut child = workshop.command(line).stdin(Stdio::piped()).spawn().unwrap();
+        child.stdin.take().unwrap().write_all(&workshop.read(name)).unwrap();
+        let ran = child.wait_with_output().unwrap();
+        assert_eq!(ran.status.code(), Some(0), "{line}: {}", String::from_utf8_lossy(&ran.stderr));
+    }
+    assert!(workshop.read("named.png") == workshop.read("piped.png"));
+    assert!(workshop.read("named.npz") == workshop.read("piped.npz"));
+    assert_eq!(workshop.pixels("named.png"), workshop.pixels("drawn.png"));
+    let empty = workshop.run("evolve - -o empty.png");
+    assert!(empty.code == Some(2) && empty.stderr.contains("/dev/stdin: the file is empty"), "{}", empty.stderr);
+}

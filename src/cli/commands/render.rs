@@ -39,8 +39,8 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct RenderArgs {
-    /// Population to draw, a .npz file
-    #[arg(value_name = "POP.npz")]
+    /// Population to draw, a .npz file; `-` reads it from stdin
+    #[arg(value_name = "POP.npz", value_parser = values::input())]
     pub input: PathBuf,
 
     /// Where to write the mosaic (.png .jpg .webp .svg .ora) or the population (.npz .csv .json); may repeat; `-`

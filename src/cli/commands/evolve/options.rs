@@ -29,8 +29,8 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(after_help = EVOLVE_EXAMPLES)]
 pub(crate) struct EvolveArgs {
-    /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP, or the first frame of a GIF
-    #[arg(value_name = "IN")]
+    /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP, or the first frame of a GIF; `-` reads it from stdin
+    #[arg(value_name = "IN", value_parser = values::input())]
     pub input: PathBuf,
 
     /// Where to write the mosaic (.png .jpg .webp .svg .ora) or the population (.npz .csv .json); may repeat; `-`

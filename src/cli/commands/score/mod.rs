@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::cli::terminal::{self, advice};
+use crate::cli::values;
 use crate::error::{Error, Result};
 use crate::metrics::{Picture, Reference, Score};
 use crate::model::Rgb;
@@ -46,11 +47,11 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_long_help = AFTER_HELP)]
 pub(crate) struct ScoreArgs {
-    /// Picture to compare with, 7x7 px at least; with --flicker a folder of frames
-    #[arg(value_name = "REF")]
+    /// Picture to compare with, 7x7 px at least, `-` for stdin; with --flicker a folder of frames
+    #[arg(value_name = "REF", value_parser = values::input())]
     pub reference: PathBuf,
-    /// Pictures to score, of the same size; with --flicker folders of frames
-    #[arg(value_name = "OUT", required = true)]
+    /// Pictures to score, of the same size, `-` for stdin; with --flicker folders of frames
+    #[arg(value_name = "OUT", required = true, value_parser = values::input())]
     pub pictures: Vec<PathBuf>,
     /// Measure how much sequences of frames change where the reference does not
     #[arg(long)]
