@@ -263,7 +263,6 @@ fn without_a_reference_or_any_picture_nothing_is_scored() {
         ("missing.png photo.png", "missing.png: there is no such file"),
         ("low.png low.png", "low.png: the picture has 40x6 px, fewer than the 7x7"),
         ("photo.png low.png", "low.png: the picture has 40x6 px and the reference 40x30"),
-        ("photo.png -", "-: there is no such file"),
         ("photo.png", "<OUT>"),
         ("photo.png photo.png --background red", "--background"),
     ] {
