@@ -54,6 +54,7 @@ impl Layers {
         canvas: &Canvas,
         supersampling: u32,
         band_count: usize,
+        watch: &mut dyn FnMut(f64),
     ) -> Result<Self> {
         let Canvas { width_px, height_px, .. } = *canvas;
         let pixel_count = width_px as usize * height_px as usize;
@@ -77,6 +78,7 @@ impl Layers {
             let (black, white) = (over([0; 3])?, over([255; 3])?);
             let png = photo::encode_png_with_alpha(width_px, height_px, &cut_out(&black, &white), &Metadata::new())?;
             layers.push((band_name(number, bands.len()), png));
+            watch(number as f64 / bands.len() as f64);
         }
         let longest = population.width_px.max(population.height_px);
         let thumbnail =

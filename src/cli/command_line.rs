@@ -17,6 +17,7 @@ use crate::cli::commands::paper::PaperArgs;
 use crate::cli::commands::plan::PlanArgs;
 use crate::cli::commands::render::RenderArgs;
 use crate::cli::commands::score::ScoreArgs;
+use crate::cli::commands::show::ShowArgs;
 use crate::cli::commands::timelapse::TimelapseArgs;
 use crate::cli::commands::video::VideoArgs;
 use crate::cli::list::BatchArgs;
@@ -87,6 +88,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         Command::Paper(args) => commands::paper::make(args),
         Command::Gallery(args) => commands::gallery::make(args),
         Command::Score(args) => commands::score::score(args),
+        Command::Show(args) => commands::show::show(args),
         Command::Plan(args) => commands::plan::plan(args, &cli.typed),
         Command::Merge(args) => commands::merge::merge(args),
         Command::Video(args) => commands::video::make(args),
@@ -140,6 +142,10 @@ enum Command {
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed
     /// with numpy, scipy and scikit-image. Of an animation the first frame is measured.
     Score(ScoreArgs),
+    /// Tell how a file was made, as the command that makes it again
+    ///
+    /// Reads what smalti wrote into its pictures, animations and populations.
+    Show(ShowArgs),
     /// Cut a batch into shards, with scripts that run them on Slurm, Kubernetes, or GNU parallel
     Plan(Box<PlanArgs>),
     /// Put the results of several shards or runs together

@@ -9,13 +9,13 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::HumanCount;
 use rayon::prelude::*;
-use serde_json::json;
+use serde_json::{Map, Value};
 
 use crate::cli::args::computing::ComputingArgs;
 use crate::cli::files::destination::Overwrite;
 use crate::cli::jobs::curve::{Curve, Point};
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::cli::terminal::progress::{Progress, ProgressKind, Stage, short_time};
+use crate::cli::terminal::progress::{Progress, ProgressKind, Stage, rounded};
 use crate::cli::terminal::{self, Verbosity};
 use crate::cli::values;
 use crate::engine::{Engine, side_by_side};
@@ -58,7 +58,7 @@ impl MosaicsArgs {
     }
 
     pub(crate) fn progress(&self) -> Progress {
-        Progress::new(self.progress.unless(self.quiet))
+        Progress::new(self.progress.unless(self.quiet), self.verbosity())
     }
 
     /// Says which page was written and how long it took, unless `--quiet` was given.
@@ -331,12 +331,6 @@ impl MosaicsDone {
     fn births_per_s(&self) -> f64 {
         self.births as f64 / (self.elapsed - self.began).as_secs_f64().max(1e-9)
     }
-
-    /// Seconds left; unknown before the first birth.
-    fn eta_s(&self) -> Option<f64> {
-        let births_left = self.births_planned.saturating_sub(self.births);
-        (self.births > 0).then(|| births_left as f64 / self.births_per_s())
-    }
 }
 
 impl Stage for MosaicsDone {
@@ -348,32 +342,32 @@ impl Stage for MosaicsDone {
         self.births as f64 / self.births_planned.max(1) as f64
     }
 
-    fn line(&self) -> String {
-        let left = self.eta_s().map(|eta_s| format!(", {} left", short_time(eta_s))).unwrap_or_default();
+    fn eta_s(&self) -> Option<f64> {
+        let births_left = self.births_planned.saturating_sub(self.births);
+        (self.births > 0).then(|| births_left as f64 / self.births_per_s())
+    }
+
+    fn count(&self) -> String {
+        format!("{}/{} mosaics", self.mosaics, self.mosaics_planned)
+    }
+
+    fn details(&self) -> String {
         format!(
-            "{} of {} mosaics, {}/{} births, {} births/s{left}",
-            self.mosaics,
-            self.mosaics_planned,
+            "{}/{} births, {} births/s",
             HumanCount(self.births),
             HumanCount(self.births_planned),
             HumanCount(self.births_per_s() as u64)
         )
     }
 
-    fn json_line(&self) -> String {
-        let rounded = |value: f64| (value * 10.0).round() / 10.0;
-        let mut line = json!({
-            "mosaics": self.mosaics,
-            "mosaics_planned": self.mosaics_planned,
-            "births": self.births,
-            "births_planned": self.births_planned,
-            "births_per_s": rounded(self.births_per_s()),
-            "elapsed_s": rounded(self.elapsed.as_secs_f64()),
-        });
-        if let Some(eta_s) = self.eta_s() {
-            line["eta_s"] = rounded(eta_s).into();
-        }
-        line.to_string()
+    fn json(&self) -> Map<String, Value> {
+        Map::from_iter([
+            ("mosaics".to_owned(), self.mosaics.into()),
+            ("mosaics_planned".to_owned(), self.mosaics_planned.into()),
+            ("births".to_owned(), self.births.into()),
+            ("births_planned".to_owned(), self.births_planned.into()),
+            ("births_per_s".to_owned(), rounded(self.births_per_s(), 1).into()),
+        ])
     }
 }
 
@@ -407,10 +401,11 @@ mod tests {
             births: 1_000,
             births_planned: 4_000,
         };
-        assert_eq!(standing.line(), "2 of 12 mosaics, 1,000/4,000 births, 100 births/s, 30s left");
-        let line: serde_json::Value = serde_json::from_str(&standing.json_line()).expect("it is JSON");
-        assert_eq!((&line["mosaics"], &line["eta_s"]), (&2.into(), &30.0.into()));
+        assert_eq!((standing.share(), standing.eta_s()), (0.25, Some(30.0)));
+        assert_eq!(standing.count(), "2/12 mosaics");
+        assert_eq!(standing.details(), "1,000/4,000 births, 100 births/s");
+        assert_eq!(standing.json()["mosaics"], 2);
         let idle = MosaicsDone { births: 0, ..standing };
-        assert_eq!(idle.line(), "2 of 12 mosaics, 0/4,000 births, 0 births/s");
+        assert_eq!((idle.share(), idle.eta_s()), (0.0, None));
     }
 }

@@ -45,6 +45,15 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
         .ok_or_else(|| "expected a whole number such as 500, 40k or 2M".to_owned())
 }
 
+/// A word, quoted for a shell.
+pub(crate) fn quoted(text: &str) -> String {
+    let is_plain = |char: char| char.is_ascii_alphanumeric() || "-_./=:,+@%".contains(char);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text.to_owned();
+    }
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
 /// A text as a cell of a CSV table. Spreadsheets take a cell for a formula that begins like one, and run it; with an
 /// apostrophe in front it is text. Numbers stay numbers.
 pub(crate) fn table_cell(text: &str) -> Cow<'_, str> {
@@ -127,6 +136,15 @@ mod tests {
         assert_eq!(duration("1h30m"), Ok(Duration::from_secs(5_400)));
         for text in ["", "s", "30 s", "-1s", "1d", "1s5", "99999999999999999999s", "9999999999999999999h"] {
             assert!(duration(text).is_err(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_word_is_quoted_for_a_shell_where_it_must_be() {
+        assert_eq!(quoted("--style=mosaic"), "--style=mosaic");
+        assert_eq!(quoted("/a/b_c-1.png"), "/a/b_c-1.png");
+        for (text, expected) in [("", "''"), ("a b", "'a b'"), ("$x", "'$x'"), ("it's", r"'it'\''s'"), ("*", "'*'")] {
+            assert_eq!(quoted(text), expected);
         }
     }
 

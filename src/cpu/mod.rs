@@ -93,7 +93,13 @@ impl Evaluator for CpuEvaluator {
 pub struct CpuPainter;
 
 impl Painter for CpuPainter {
-    fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
-        Ok(mosaic::draw(population, canvas, supersampling))
+    fn draw_watched(
+        &mut self,
+        population: &Population,
+        canvas: &Canvas,
+        supersampling: u32,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Mosaic> {
+        Ok(mosaic::draw(population, canvas, supersampling, watch))
     }
 }

@@ -14,7 +14,7 @@ use crate::model::{Backdrop, Blend, Canvas, Mask, Mosaic, Patch, Population};
 const PATCH_SIDE: u32 = 256;
 
 /// Draws `population` on `canvas`, each pixel the mean of `supersampling`² samples.
-pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32) -> Mosaic {
+pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32, watch: &mut dyn FnMut(f64)) -> Mosaic {
     let samples = canvas.supersampled(supersampling);
     let side = PATCH_SIDE / supersampling * supersampling;
     let ring_width = population.grout.map_or(0, |grout| grout.width);
@@ -36,6 +36,7 @@ pub(super) fn draw(population: &Population, canvas: &Canvas, supersampling: u32)
         for (patch, colors) in drawn {
             mosaic.absorb(&patch, &colors, supersampling);
         }
+        watch((first + lists.columns() as usize) as f64 / lists.block_count() as f64);
     }
     mosaic
 }

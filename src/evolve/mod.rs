@@ -22,7 +22,7 @@ pub mod style;
 
 /// Version of the algorithm, for both schemes. Raise it whenever the same picture, options and seed lead to another
 /// result. It is in every key, so raising it makes every existing output out of date.
-pub const ALGORITHM_VERSION: u32 = 1;
+pub const ALGORITHM_VERSION: u32 = 2;
 
 pub use color::{ColorMode, ColorRule};
 pub use ended::{Ended, Ending, Tally};

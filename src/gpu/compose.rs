@@ -83,12 +83,19 @@ impl ComposePass {
     }
 
     /// Draws on the canvas, each pixel the mean of `supersampling`² samples.
-    pub fn draw(mut self, recorder: &mut Recorder, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
+    pub fn draw(
+        mut self,
+        recorder: &mut Recorder,
+        canvas: &Canvas,
+        supersampling: u32,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Mosaic> {
         let mut mosaic = Mosaic::new(canvas, self.background);
         for number in 0..self.lists.block_count() {
             let patch = self.lists.patch(number, &self.samples);
             let colors = self.draw_patch(recorder, number, &patch)?;
             mosaic.absorb(&patch, &colors, supersampling);
+            watch((number + 1) as f64 / self.lists.block_count() as f64);
         }
         Ok(mosaic)
     }

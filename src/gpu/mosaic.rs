@@ -76,12 +76,19 @@ impl MosaicPass {
         })
     }
 
-    /// Draws on `canvas`, each pixel the mean of `supersampling`² samples.
-    pub fn draw(&self, recorder: &mut Recorder, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
+    /// Draws on `canvas`, each pixel the mean of `supersampling`² samples; tells `watch` the share that is done.
+    pub fn draw(
+        &self,
+        recorder: &mut Recorder,
+        canvas: &Canvas,
+        supersampling: u32,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Mosaic> {
         let mut mosaic = Mosaic::new(canvas, self.background);
         let color = Arc::clone(&self.color);
-        self.draw_patches(recorder, supersampling, &color, |patch, samples| {
+        self.draw_patches(recorder, supersampling, &color, |patch, samples, share| {
             mosaic.absorb(patch, samples, supersampling);
+            watch(share);
         })?;
         Ok(mosaic)
     }
@@ -91,7 +98,7 @@ impl MosaicPass {
         let width = self.samples.width_px as usize;
         let mut layer = vec![NO_FLY; width * self.samples.height_px as usize];
         let fly = Arc::clone(&self.fly);
-        self.draw_patches(recorder, 1, &fly, |patch, flies| {
+        self.draw_patches(recorder, 1, &fly, |patch, flies, _| {
             for (row, flies) in flies.chunks_exact(patch.width_px as usize).enumerate() {
                 let first = (patch.y as usize + row) * width + patch.x as usize;
                 layer[first..first + flies.len()].copy_from_slice(flies);
@@ -100,13 +107,14 @@ impl MosaicPass {
         Ok(layer)
     }
 
-    /// Draws every patch and hands the rows of `attachment` to `take`. Patches start at multiples of `grain`.
+    /// Draws every patch and hands the rows of `attachment` to `take`, with the share of all patches that are drawn.
+    /// Patches start at multiples of `grain`.
     fn draw_patches(
         &self,
         recorder: &mut Recorder,
         grain: u32,
         attachment: &Arc<Image>,
-        mut take: impl FnMut(&Patch, &[u32]),
+        mut take: impl FnMut(&Patch, &[u32], f64),
     ) -> Result<()> {
         let shape = self.color.shape();
         let side = shape.width_px.max(shape.height_px) / grain * grain;
@@ -121,7 +129,7 @@ impl MosaicPass {
             recorder.read_into(&ticket, bytemuck::cast_slice_mut(&mut pixels))?;
             let rows = pixels.chunks_exact(shape.width_px as usize).take(patch.height_px as usize);
             let packed: Vec<u32> = rows.flat_map(|row| &row[..patch.width_px as usize]).copied().collect();
-            take(&patch, &packed);
+            take(&patch, &packed, (number + 1) as f64 / lists.block_count() as f64);
         }
         Ok(())
     }

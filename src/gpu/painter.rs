@@ -35,13 +35,19 @@ impl GpuPainter {
 }
 
 impl Painter for GpuPainter {
-    fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
+    fn draw_watched(
+        &mut self,
+        population: &Population,
+        canvas: &Canvas,
+        supersampling: u32,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Mosaic> {
         if population.masks.blend() == Blend::Translucent {
             let pass = ComposePass::create(&self.device, &mut self.recorder, population, canvas, supersampling)?;
-            return pass.draw(&mut self.recorder, canvas, supersampling);
+            return pass.draw(&mut self.recorder, canvas, supersampling, watch);
         }
         let samples = canvas.supersampled(supersampling);
         let pass = MosaicPass::create(&self.device, &mut self.recorder, population, &samples)?;
-        pass.draw(&mut self.recorder, canvas, supersampling)
+        pass.draw(&mut self.recorder, canvas, supersampling, watch)
     }
 }

@@ -35,6 +35,12 @@ pub(crate) struct Laid<'a> {
     pub mask_layers: MaskLayers,
 }
 
+/// The grout of tiles of which nothing was asked, and of those that are only to have some.
+pub(super) struct UsualGrout {
+    pub of_style: Option<Grout>,
+    pub if_asked: Option<Grout>,
+}
+
 /// What was asked for of a search, checked.
 #[derive(Clone, Debug)]
 pub(crate) struct CellsSettings {
@@ -97,6 +103,25 @@ impl CellsSettings {
     /// The grout of so many tiles.
     pub(crate) fn grout(&self, target: &Target, fly_count: usize) -> Option<Grout> {
         self.grout.of(self.style.grout_q8, side_of(target, fly_count), target)
+    }
+
+    /// The grout of so many tiles if none were asked for.
+    pub(super) fn usual_grout(&self, target: &Target, fly_count: usize) -> UsualGrout {
+        let side = side_of(target, fly_count);
+        UsualGrout {
+            of_style: GroutChoice::default().of(self.style.grout_q8, side, target),
+            if_asked: GroutChoice::auto().of(self.style.grout_q8, side, target),
+        }
+    }
+
+    /// Children that are tried in each step.
+    pub(super) fn candidates(&self) -> u32 {
+        self.candidates
+    }
+
+    /// Where colours come from.
+    pub(super) fn color(&self) -> ColorSource {
+        self.color
     }
 
     /// The colour behind the tiles, unless one is asked for.
@@ -257,7 +282,7 @@ fn color_source(mode: Option<ColorMode>, colors: Option<&Colors>) -> Result<Colo
     Ok(source)
 }
 
-fn color_name(color: ColorSource) -> &'static str {
+pub(super) fn color_name(color: ColorSource) -> &'static str {
     match color {
         ColorSource::Median => "median",
         ColorSource::Mean => "mean",

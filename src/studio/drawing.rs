@@ -137,20 +137,37 @@ impl Drawn {
         Pieces { picture: pieces.picture && self.picture.is_none(), layers: pieces.layers && self.layers.is_none() }
     }
 
-    /// Draws what of `pieces` is not there yet.
+    /// Draws what of `pieces` is not there yet, and now and then tells `watch` which share of it is done, 0 to 1.
     ///
     /// # Errors
     /// If the device fails.
-    pub(crate) fn draw(&mut self, painter: &mut dyn Painter, pieces: Pieces) -> Result<()> {
+    pub(crate) fn draw_watched(
+        &mut self,
+        painter: &mut dyn Painter,
+        pieces: Pieces,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<()> {
         let View { canvas, supersampling } = self.view;
         let missing = self.missing(pieces);
+        // A band of layers is drawn over black and over white.
+        let picture_share = if missing.layers { 1.0 / (1.0 + 2.0 * BAND_COUNT as f64) } else { 1.0 };
         if missing.picture {
-            self.picture = Some(painter.draw(&self.population, &canvas, supersampling)?.into());
+            let watch = &mut |share| watch(share * picture_share);
+            self.picture = Some(painter.draw_watched(&self.population, &canvas, supersampling, watch)?.into());
         }
         if missing.layers {
-            self.layers = Some(Layers::draw(painter, &self.population, &canvas, supersampling, BAND_COUNT)?);
+            let watch = &mut |share| watch(picture_share + share * (1.0 - picture_share));
+            self.layers = Some(Layers::draw(painter, &self.population, &canvas, supersampling, BAND_COUNT, watch)?);
         }
         Ok(())
+    }
+
+    /// As [`Drawn::draw_watched`], with nobody to tell.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn draw(&mut self, painter: &mut dyn Painter, pieces: Pieces) -> Result<()> {
+        self.draw_watched(painter, pieces, &mut |_| {})
     }
 
     /// The bytes of a content.

@@ -10,7 +10,7 @@ use crate::model::{Grout, Rgb, Target};
 const USUAL_Q8: u32 = 16;
 
 /// What was asked for, checked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct GroutChoice {
     color: Option<GroutColor>,
     /// In 1/64 px.
@@ -28,6 +28,11 @@ impl GroutChoice {
         }
         let in_units = |px: f64| (px * f64::from(UNITS_PER_PX)).round() as u32;
         Ok(Self { color, width: width_px.map(in_units) })
+    }
+
+    /// Some grout, of the usual width and colour.
+    pub(super) fn auto() -> Self {
+        Self { color: Some(GroutColor::Auto), width: None }
     }
 
     /// The parameter that asks for grout, if one does.

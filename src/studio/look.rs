@@ -69,6 +69,17 @@ impl Mask {
         }
     }
 
+    /// Which of the shapes that come with smalti it is, if it is one.
+    pub(super) fn built_in(&self) -> Option<BuiltIn> {
+        match &self.0 {
+            MaskSource::Named(path) => BuiltIn::ALL.into_iter().find(|shape| path.as_os_str() == shape.name()),
+            MaskSource::Template(template) => match template.source() {
+                Source::BuiltIn(shape) => Some(*shape),
+                Source::File(_) | Source::Memory => None,
+            },
+        }
+    }
+
     fn template(&self) -> Result<Template> {
         match &self.0 {
             MaskSource::Named(path) => Template::find(path),
@@ -195,6 +206,30 @@ impl Look {
             && self.restart_masks.is_empty()
             && self.shader == Shader::Template
             && self.blend == Blend::Opaque
+    }
+
+    /// The fewest choices that make this look over what `style` says of it, and the masks from the first restart on;
+    /// none if nothing need be chosen. `is_plain` says that all tiles are plain squares, whatever was asked for.
+    pub(super) fn asked(&self, style: Option<&Style>, is_plain: bool) -> Option<(LookChoices, &[Mask])> {
+        let filled = |choices: &LookChoices| {
+            let over_style = style.map_or_else(|| Ok(choices.clone()), |style| choices.or_style(style)).ok()?;
+            Self::new(&over_style, &self.restart_masks, None).ok()
+        };
+        let usual = filled(&LookChoices::default())?;
+        if is_plain && usual.is_default() {
+            return None;
+        }
+        let opacity = super::decimal::of_units(u32::from(self.opacity.get()), 255.0);
+        let base = LookChoices {
+            masks: if self.masks == usual.masks { Vec::new() } else { self.masks.clone() },
+            shader: Some(self.shader).filter(|&shader| shader != usual.shader),
+            ..LookChoices::default()
+        };
+        let blends = [None, Some(self.blend)];
+        let ways = [None, Some(opacity)].into_iter().flat_map(|opacity| blends.map(|blend| (opacity, blend)));
+        let mut choices = ways.map(|(opacity, blend)| LookChoices { opacity, blend, ..base.clone() });
+        let found = choices.find(|choices| filled(choices).as_ref() == Some(self))?;
+        Some((found, &self.restart_masks))
     }
 
     /// Whether tiles change their masks at the first restart.

@@ -11,10 +11,12 @@
 
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports, reason = "the command line uses the rest"))]
 
+mod asked;
 mod cells;
 mod choices;
 mod course;
 mod crew;
+mod decimal;
 mod device;
 mod drawing;
 mod fitted;
@@ -30,6 +32,7 @@ mod paper;
 mod parameters;
 mod picture;
 mod preset;
+mod preset_text;
 mod presets;
 mod progress;
 mod provenance;
@@ -52,6 +55,7 @@ pub use self::recipe::Recipe;
 pub use self::session::Session;
 pub use self::tile::Tile;
 
+pub(crate) use self::asked::look_asked;
 pub(crate) use self::cells::CellsSettings;
 pub(crate) use self::choices::Colors;
 pub(crate) use self::device::{OpenedSearch, PipelineKeeper, select, select_all};

@@ -15,7 +15,6 @@ use crate::error::{Error, Result};
 use crate::evolve::{Ending, StopReason};
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Backdrop, Population, Rgb};
-use crate::openraster::{BAND_COUNT, Layers};
 use crate::photo::{Photo, WEBP_SIDE_MAX_PX};
 
 /// The pixels of a mosaic.
@@ -206,9 +205,7 @@ impl Mosaic {
     /// If the file would be too large for its format.
     pub fn ora(&self) -> Result<Vec<u8>> {
         let mut drawn = self.drawn.clone();
-        let View { canvas, supersampling } = drawn.view;
-        let painter = &mut CpuPainter;
-        drawn.layers = Some(Layers::draw(painter, &drawn.population, &canvas, supersampling, BAND_COUNT)?);
+        drawn.draw(&mut CpuPainter, Pieces { picture: false, layers: true })?;
         drawn.encode(Content::OpenRaster, &self.told())
     }
 

@@ -61,7 +61,7 @@ fn cool_q16(cool: f64, restarts: u32) -> Result<u32> {
 }
 
 /// A probability in 1/65536; one that is neither 0 nor 1 stays so.
-fn probability_q16(probability: f64) -> u32 {
+pub(super) fn probability_q16(probability: f64) -> u32 {
     let rounded = (probability * f64::from(ONE_Q16)).round() as u32;
     let is_certain = probability == 0.0 || probability == 1.0;
     if is_certain { rounded } else { rounded.clamp(1, ONE_Q16 - 1) }
@@ -137,7 +137,7 @@ pub(super) fn told(scheme: &PaperScheme) -> Vec<String> {
     parts.into_iter().filter(|(differs, _)| *differs).map(|(_, part)| part).collect()
 }
 
-fn on_dry_name(on_dry: OnDry) -> &'static str {
+pub(super) fn on_dry_name(on_dry: OnDry) -> &'static str {
     match on_dry {
         OnDry::Fallback => "fallback",
         OnDry::Restart => "restart",
@@ -145,7 +145,7 @@ fn on_dry_name(on_dry: OnDry) -> &'static str {
     }
 }
 
-fn color_mode_name(mode: ColorMode) -> &'static str {
+pub(super) fn color_mode_name(mode: ColorMode) -> &'static str {
     match mode {
         ColorMode::Evolved => "evolved",
         ColorMode::Pick => "pick",

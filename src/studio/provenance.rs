@@ -6,7 +6,8 @@
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
-use super::cells::MaskLayers;
+use super::asked::asked;
+use super::cells::{CellsSettings, MaskLayers};
 use super::hex::hexadecimal;
 use super::job::Job;
 use super::paper;
@@ -72,12 +73,13 @@ pub(crate) struct Told {
 /// key.
 fn mosaic_specific(settings: &Settings, job: &Job, resized_px: Option<u32>, version: u32) -> Map<String, Value> {
     let specific = json!({
-        "content": "mosaic",
+        "content": content(&job.scheme),
         "algorithm": version,
         "tiles": job.fly_count,
         "init_sha256": job.init.as_deref().map(population_sha256),
         "time_ms": settings.time_limit.map(|limit| u64::try_from(limit.as_millis()).unwrap_or(u64::MAX)),
         "output_size_px": resized_px,
+        "recipe": asked(settings, job, resized_px),
     });
     let mut specific = if let Value::Object(specific) = specific { specific } else { Map::new() };
     specific.extend(match &job.scheme {
@@ -99,6 +101,15 @@ fn mosaic_specific(settings: &Settings, job: &Job, resized_px: Option<u32>, vers
         specific.insert("weights_sha256".to_owned(), hexadecimal(&Sha256::digest(weights)).into());
     }
     specific
+}
+
+/// What a picture of this scheme is called.
+fn content(scheme: &SchemeSettings) -> &'static str {
+    let has_strokes = |cells: &CellsSettings| cells.style().is_stroke || cells.style().blend == Blend::Translucent;
+    match scheme {
+        SchemeSettings::Cells(cells) if has_strokes(cells) => "painting",
+        SchemeSettings::Cells(_) | SchemeSettings::Paper(_) => "mosaic",
+    }
 }
 
 impl Provenance {

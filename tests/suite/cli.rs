@@ -223,7 +223,7 @@ fn a_dry_run_tells_the_plan_and_writes_nothing() {
     let workshop = Workshop::new();
     let before = workshop.files();
     let ran = workshop.evolve("-o a.png -o b.npz --save-target t.png --output-size 400 --dry-run");
-    for part in ["40x30 px", "60 from random", "300", "seed 0", "CPU", "a.png, b.npz, t.png", "memory", "key"] {
+    for part in ["40x30 px", "60, at random at first", "300", "seed 0", "CPU", "a.png, b.npz, t.png", "memory", "key"] {
         assert!(ran.stderr.contains(part), "{part} in {}", ran.stderr);
     }
     let row = workshop.evolve_to_row("-o a.png --dry-run");

@@ -163,13 +163,13 @@ fn a_cut_before_the_last_split_or_change_of_masks_is_told() {
     let line = "evolve photo.png --scheme paper -n 60 --births 1000M --time 200ms -o a.png --force --json";
     let ran = workshop.run(&format!("{line} --mitosis 2 --restarts 2"));
     assert_eq!([&ran.row()["tiles"], &ran.row()["living"]], [60, 15]);
-    let told = "stopped by time before the last split or change of masks, with 15 tiles alive";
+    let told = "ended when the time was up before the last split or change of masks, with 15 tiles alive";
     assert!(ran.stderr.contains(told), "{}", ran.stderr);
     let ran = workshop.run(&format!("{line} --restarts 1 --restart-mask flower"));
-    assert!(ran.stderr.contains("stopped by time before the last change of masks\n"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("ended when the time was up before the last change of masks\n"), "{}", ran.stderr);
     assert_eq!([&ran.row()["tiles"], &ran.row()["living"]], [60, 60]);
     let ran = workshop.run(&format!("{line} --restarts 1"));
-    assert!(ran.stderr.contains("stopped by time\n"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("ended when the time was up\n"), "{}", ran.stderr);
 }
 
 #[test]

@@ -49,6 +49,7 @@ mod shader_manifest;
 mod shaders_fresh;
 mod shapes;
 mod shards;
+mod show;
 mod snapshots;
 mod sources;
 mod spirv;

@@ -11,5 +11,6 @@ pub(crate) mod paper;
 pub(crate) mod plan;
 pub(crate) mod render;
 pub(crate) mod score;
+pub(crate) mod show;
 pub(crate) mod timelapse;
 pub(crate) mod video;

@@ -17,6 +17,7 @@ use crate::cli::files::places::Inputs;
 use crate::cli::files::{memory, outputs, replacing};
 use crate::cli::jobs::row::Status;
 use crate::cli::terminal::interrupt::Interrupt;
+use crate::cli::terminal::progress::{Progress, ProgressKind};
 use crate::cli::terminal::{self, Verbosity, advice};
 use crate::cli::values;
 use crate::error::{Error, Result};
@@ -25,7 +26,7 @@ use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Backdrop, Blend, Grout, Population};
 use crate::studio::{
     Device, Drawn, Dress, KEEPS_MASKS, Look, Provenance, SUPERSAMPLING_MAX, Told, View, backdrop, drawing_bytes,
-    hexadecimal, population_sha256,
+    hexadecimal, look_asked, population_sha256,
 };
 use crate::vk::Validation;
 
@@ -220,7 +221,7 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
     if population.flies.is_empty() {
         return Err(Error::input(&options.input, "holds no flies; give a population of at least one"));
     }
-    let population = adapted(population, options)?;
+    let (population, asked) = adapted(population, options)?;
     if options.look.is_some() {
         // The fitness is that of other tiles, and there is no target to measure it again.
         fitness.fill(0);
@@ -232,7 +233,7 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
     }
     let view = options.view(population.width_px, population.height_px)?;
     check_size(options, &population, &view)?;
-    let provenances = Provenances::new(&population, &fitness, &view);
+    let provenances = Provenances::new(&population, &fitness, &view, asked);
     row.key = Some(provenances.of_row(options).key().to_owned());
     for output in &options.outputs {
         replacing::check_replaceable(output, provenances.of_output(output).key(), options.overwrite)?;
@@ -243,7 +244,12 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
     draw(&mut drawn, options, &device)?;
     row.draw_ms = terminal::milliseconds(began.elapsed());
     let began = Instant::now();
-    let files = outputs::encode(&options.outputs.iter().collect::<Vec<_>>(), &drawn, &provenances.told(&meta))?;
+    let files = outputs::encode(
+        &options.outputs.iter().collect::<Vec<_>>(),
+        &drawn,
+        &provenances.told(&meta),
+        options.verbosity,
+    )?;
     // Before this point an interrupt leaves no files.
     destination::sweep_beside(options.outputs.iter().map(|output| output.path.as_path()));
     outputs::write(&files, &Interrupt::listen()?, &mut row.output)?;
@@ -260,11 +266,22 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
     Ok(())
 }
 
-/// The population with the look that the options ask for. Every change is part of its key.
-fn adapted(mut population: Population, options: &RenderOptions) -> Result<Population> {
-    population.background = options.background.unwrap_or(population.background);
+/// The population with the look that the options ask for, and what they ask for, under the names of the flags. Every
+/// change is part of its key.
+fn adapted(mut population: Population, options: &RenderOptions) -> Result<(Population, Map<String, Value>)> {
+    let mut asked = Map::new();
+    if let Some(background) = options.background {
+        population.background = background;
+        let color = match background {
+            Backdrop::Color(color) => hexadecimal(&color),
+            Backdrop::Transparent => "none".to_owned(),
+        };
+        asked.insert("background".to_owned(), color.into());
+    }
     if let Some(look) = &options.look {
-        let Dress { masks, layers_by_run } = look.dress()?;
+        let dress = look.dress()?;
+        asked.extend(look_asked(look, None, Some(&dress)));
+        let Dress { masks, layers_by_run } = dress;
         let worn = PaperScheme { masks: layers_by_run, ..PaperScheme::default() };
         population.flies = begin_from(&worn, population.flies);
         population.masks = masks;
@@ -275,7 +292,7 @@ fn adapted(mut population: Population, options: &RenderOptions) -> Result<Popula
             ));
         }
     }
-    Ok(population)
+    Ok((population, asked))
 }
 
 /// Refuses pictures that are too large for their formats or for the memory.
@@ -295,7 +312,9 @@ fn draw(drawn: &mut Drawn, options: &RenderOptions, device: &Device) -> Result<(
         return Ok(());
     }
     let mut painter = device.open_painter()?;
-    outputs::draw(drawn, &mut *painter, destination::pieces(&options.outputs), options.verbosity)?;
+    let kind = ProgressKind::Auto.unless(options.verbosity == Verbosity::Quiet);
+    let progress = Progress::new(kind, options.verbosity);
+    outputs::draw(drawn, &mut *painter, destination::pieces(&options.outputs), progress)?;
     drop(painter);
     device.check_validation()
 }
@@ -307,7 +326,7 @@ struct Provenances {
 }
 
 impl Provenances {
-    fn new(population: &Population, fitness: &[i64], view: &View) -> Self {
+    fn new(population: &Population, fitness: &[i64], view: &View, mut asked: Map<String, Value>) -> Self {
         let mut decisive = Map::new();
         decisive.insert("content".to_owned(), "render".into());
         decisive.insert("algorithm".to_owned(), ALGORITHM_VERSION.into());
@@ -322,21 +341,27 @@ impl Provenances {
         if let Some(Grout { width, color }) = population.grout {
             decisive.insert("grout".to_owned(), json!({"width": width, "color": hexadecimal(&color)}));
         }
-        let with = |specific: [(&str, Value); 2]| {
+        let recipe = |asked: &Map<String, Value>| [("recipe".to_owned(), Value::from(asked.clone()))];
+        let with = |asked: &Map<String, Value>, specific: [(&str, Value); 2]| {
             let specific = specific.into_iter().map(|(name, value)| (name.to_owned(), value));
-            Provenance::of(decisive.clone().into_iter().chain(specific).collect())
+            Provenance::of(decisive.clone().into_iter().chain(recipe(asked)).chain(specific).collect())
         };
         let (width_px, height_px) = (view.canvas.width_px, view.canvas.height_px);
         let mut hash = Sha256::new();
         fitness.iter().for_each(|value| hash.update(value.to_le_bytes()));
         let fitness_sha256 = hexadecimal(&hash.finalize());
-        Self {
-            picture: with([
-                ("output_size_px", json!(width_px.max(height_px))),
-                ("supersampling", json!(view.supersampling)),
-            ]),
-            population: with([("fitness_sha256", json!(fitness_sha256)), ("tiles", json!(fitness.len()))]),
+        let told = [("fitness_sha256", json!(fitness_sha256)), ("tiles", json!(fitness.len()))];
+        let population_told = with(&asked, told);
+        let long_side_px = width_px.max(height_px);
+        if long_side_px != population.width_px.max(population.height_px) {
+            asked.insert("output-size".to_owned(), long_side_px.into());
         }
+        let usual = View::new(population.width_px, population.height_px, Some(long_side_px)).supersampling;
+        if view.supersampling != usual {
+            asked.insert("supersample".to_owned(), view.supersampling.into());
+        }
+        let told = [("output_size_px", json!(long_side_px)), ("supersampling", json!(view.supersampling))];
+        Self { picture: with(&asked, told), population: population_told }
     }
 
     fn of_output(&self, output: &Destination) -> &Provenance {

@@ -7,13 +7,13 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 use indicatif::HumanCount;
-use serde_json::json;
+use serde_json::{Map, Value};
 
 use super::Film;
 use crate::archive;
 use crate::cli::files::memory;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::cli::terminal::progress::{Progress, Stage, short_time};
+use crate::cli::terminal::progress::{Progress, Stage};
 use crate::error::{Error, Result};
 use crate::model::{Backdrop, Canvas, Mosaic, Painter, Population};
 use crate::photo::{Frames, Timing};
@@ -160,12 +160,6 @@ struct FramesDone {
     frame_count: usize,
 }
 
-impl FramesDone {
-    fn eta_s(&self) -> f64 {
-        self.elapsed.as_secs_f64() / self.frames as f64 * (self.frame_count - self.frames) as f64
-    }
-}
-
 impl Stage for FramesDone {
     fn elapsed(&self) -> Duration {
         self.elapsed
@@ -175,19 +169,17 @@ impl Stage for FramesDone {
         self.frames as f64 / self.frame_count as f64
     }
 
-    fn line(&self) -> String {
-        let count = |frames: usize| HumanCount(frames as u64);
-        format!("{}/{} frames, {} left", count(self.frames), count(self.frame_count), short_time(self.eta_s()))
+    fn eta_s(&self) -> Option<f64> {
+        Some(self.elapsed.as_secs_f64() / self.frames as f64 * (self.frame_count - self.frames) as f64)
     }
 
-    fn json_line(&self) -> String {
-        let rounded = |value: f64| (value * 10.0).round() / 10.0;
-        json!({
-            "frames": self.frames,
-            "frame_count": self.frame_count,
-            "elapsed_s": rounded(self.elapsed.as_secs_f64()),
-            "eta_s": rounded(self.eta_s()),
-        })
-        .to_string()
+    fn count(&self) -> String {
+        let count = |frames: usize| HumanCount(frames as u64);
+        format!("{}/{} frames", count(self.frames), count(self.frame_count))
+    }
+
+    fn json(&self) -> Map<String, Value> {
+        let count = |frames: usize| Value::from(frames);
+        Map::from_iter([("frames".to_owned(), count(self.frames)), ("frame_count".to_owned(), count(self.frame_count))])
     }
 }

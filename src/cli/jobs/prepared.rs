@@ -107,7 +107,7 @@ impl Prepared {
         keep: Keep,
     ) -> Evolution {
         let _span = options.tracer.span("evolve").tell("picture", self.id.as_str());
-        let progress = Progress::new(options.progress);
+        let progress = Progress::new(options.progress, options.verbosity);
         let mut watch = Watch::begin(watchers, &options.settings, progress, self.job.evals_planned());
         let mut curve = (keep == Keep::Curve).then(|| Curve::new(self.job.evals_planned()));
         let mut course = options.tracer.course();
@@ -135,7 +135,8 @@ impl Prepared {
     /// If the device fails, or if the mosaic is not what was scored.
     pub fn draw(&self, options: &PictureOptions, ended: Ended, painter: &mut dyn Painter) -> Result<Evolved> {
         let mut finished = finish(&self.job, ended, painter, options.output_long_side_px)?;
-        outputs::draw(&mut finished.drawn, painter, destination::pieces(&options.outputs), options.verbosity)?;
+        let progress = Progress::new(options.progress, options.verbosity);
+        outputs::draw(&mut finished.drawn, painter, destination::pieces(&options.outputs), progress)?;
         Ok(Evolved { ending: finished.ending, psnr_db: finished.psnr_db, drawn: finished.drawn, curve: None })
     }
 }

@@ -1,8 +1,9 @@
 //! The result of a picture as a row that programs can read.
 
 use std::path::Path;
+use std::time::SystemTime;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::cli::terminal::interrupt::EXIT_INTERRUPTED;
@@ -71,6 +72,8 @@ pub(crate) struct Row {
     pub load_ms: f64,
     pub evolve_ms: f64,
     pub save_ms: f64,
+    /// When the work on the picture ended, in UTC.
+    pub ended_at: Option<String>,
     pub device: Option<String>,
     /// The part of a batch that this process did.
     pub shard: Option<String>,
@@ -78,6 +81,18 @@ pub(crate) struct Row {
     pub version: &'static str,
     /// Why the picture failed.
     pub error: Option<String>,
+}
+
+/// What an earlier row tells of a result that its files do not.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct Figures {
+    pub psnr: Option<f64>,
+    pub spread: Option<f64>,
+    pub living: Option<usize>,
+    pub evolve_ms: f64,
+    pub device: Option<String>,
+    pub host: Option<String>,
 }
 
 impl Row {
@@ -107,6 +122,7 @@ impl Row {
             load_ms: 0.0,
             evolve_ms: 0.0,
             save_ms: 0.0,
+            ended_at: None,
             device: None,
             shard: None,
             host: host_name(),
@@ -149,6 +165,18 @@ impl Row {
         self.evals = number("evals").unwrap_or(self.births);
         self.fallback_kills = number("fallback_kills").unwrap_or_default();
         self.restarts = number("restarts_made").unwrap_or_default() as u32;
+    }
+
+    /// Notes that the work has ended now.
+    pub fn note_end(&mut self) {
+        self.ended_at = Some(humantime::format_rfc3339_millis(SystemTime::now()).to_string());
+    }
+
+    /// Notes the figures of an earlier row of the same result, which its files do not tell.
+    pub fn note_figures(&mut self, figures: Figures) {
+        let Figures { psnr, spread, living, evolve_ms, device, host } = figures;
+        (self.psnr, self.spread, self.living, self.evolve_ms, self.device, self.host) =
+            (psnr, spread, living, evolve_ms, device, host);
     }
 
     /// Notes why the result is missing or incomplete.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -38,6 +38,13 @@ pub(crate) struct RowParts {
     pub evolve_ms: f64,
     #[serde(default)]
     pub error: Option<String>,
+    /// When the work ended, in UTC, so that the order of the texts is that of the times.
+    #[serde(default)]
+    ended_at: Option<String>,
+    #[serde(default)]
+    pub key: Option<String>,
+    #[serde(default)]
+    pub output: Vec<PathBuf>,
 }
 
 impl RowParts {
@@ -56,8 +63,9 @@ pub(crate) struct Rows {
 impl Rows {
     /// Adds the rows of a file. Returns a warning about each line that is not a row.
     ///
-    /// If one file has several rows of a picture, the last one counts. If several files have one, a success counts, or
-    /// else the row of the file that was read last.
+    /// If one file has several rows of a picture, the last one counts. If several files have one, the row that was
+    /// written last counts; where rows do not tell when that was, a success, or else the row of the file that was read
+    /// last.
     ///
     /// # Errors
     /// [`Error::Input`] if the file cannot be read, if none of its lines is a row, or if a line is neither a row nor
@@ -123,8 +131,11 @@ impl Rows {
 
     /// Adds the row of a later file.
     fn take(&mut self, row: ResultRow) {
-        let known = self.by_id.get(&row.told.id);
-        if known.is_none_or(|known| row.told.is_success() || !known.told.is_success()) {
+        let is_newer = |known: &ResultRow| match (&known.told.ended_at, &row.told.ended_at) {
+            (Some(known), Some(new)) if known != new => new > known,
+            _ => row.told.is_success() || !known.told.is_success(),
+        };
+        if self.by_id.get(&row.told.id).is_none_or(is_newer) {
             self.by_id.insert(row.told.id.clone(), row);
         }
     }
@@ -187,7 +198,6 @@ pub(crate) fn holds_result_rows(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::path::PathBuf;
 
     use tempfile::TempDir;
 
@@ -246,6 +256,18 @@ mod tests {
         assert_eq!(merged(&contents).0, expected(&[("a", "unchanged")]), "of two successes the later file's");
         let contents = [line("a", "partial", 0.0), bad];
         assert_eq!(merged(&contents).0, expected(&[("a", "failed")]), "of two failures the later file's");
+    }
+
+    #[test]
+    fn of_rows_that_tell_when_they_ended_the_newest_counts_in_whatever_order_the_files_are_read() {
+        let at =
+            |status: &str, time: &str| format!(r#"{{"id":"a","status":"{status}","ended_at":"2026-11-{time}.000Z"}}"#);
+        let rows = [at("complete", "09T10:00:00"), at("failed", "10T09:00:00"), at("unchanged", "02T23:59:59")];
+        for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2]] {
+            assert_eq!(merged(&order.map(|number| rows[number].clone())).0, expected(&[("a", "failed")]));
+        }
+        // A row of an older version has no time.
+        assert_eq!(merged(&[rows[1].clone(), line("a", "complete", 0.0)]).0, expected(&[("a", "complete")]));
     }
 
     #[test]

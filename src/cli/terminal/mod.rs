@@ -5,6 +5,7 @@ pub(crate) mod aside;
 pub(crate) mod interrupt;
 pub(crate) mod progress;
 mod shown;
+pub(crate) mod words;
 
 pub(crate) use shown::shown;
 

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use clap::ValueEnum;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use serde_json::json;
+use serde_json::{Map, Value};
 
-use super::{say, shown};
+use super::{Verbosity, say, shown};
 
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -35,10 +35,43 @@ pub(crate) trait Stage {
     fn elapsed(&self) -> Duration;
     /// How much is done, 0 to 1.
     fn share(&self) -> f64;
-    /// For people.
-    fn line(&self) -> String;
-    /// For programs.
-    fn json_line(&self) -> String;
+    /// Seconds that are left, once they can be estimated.
+    fn eta_s(&self) -> Option<f64>;
+    /// What people count, such as pictures; empty if the share says enough.
+    fn count(&self) -> String {
+        String::new()
+    }
+    /// Figures for those who want to know more.
+    fn details(&self) -> String {
+        String::new()
+    }
+    /// Figures for programs, besides the time.
+    fn json(&self) -> Map<String, Value>;
+}
+
+/// The line for people: how much is done and what is left to wait come first, so that no narrow window cuts them off.
+fn line(stage: &impl Stage, verbosity: Verbosity) -> String {
+    let share = format!("{} %", (stage.share() * 100.0).clamp(0.0, 100.0) as u64);
+    let left = stage.eta_s().map(|eta_s| format!("{} left", short_time(eta_s)));
+    let details = Some(stage.details()).filter(|_| verbosity == Verbosity::Verbose);
+    let parts = [Some(share), left, Some(stage.count()), details];
+    parts.into_iter().flatten().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" \u{b7} ")
+}
+
+/// The line for programs: one object.
+fn json_line(stage: &impl Stage) -> String {
+    let mut line = stage.json();
+    line.insert("elapsed_s".to_owned(), rounded(stage.elapsed().as_secs_f64(), 1).into());
+    if let Some(eta_s) = stage.eta_s() {
+        line.insert("eta_s".to_owned(), rounded(eta_s, 1).into());
+    }
+    Value::Object(line).to_string()
+}
+
+/// A number with so many decimals.
+pub(crate) fn rounded(value: f64, decimals: i32) -> f64 {
+    let scale = 10_f64.powi(decimals);
+    (value * scale).round() / scale
 }
 
 /// How far an evolution has come.
@@ -70,6 +103,7 @@ pub(crate) enum Measure {
 #[derive(Debug)]
 pub(crate) struct Progress {
     form: Form,
+    verbosity: Verbosity,
     next: Duration,
 }
 
@@ -83,7 +117,7 @@ enum Form {
 
 impl Progress {
     /// Progress of the requested kind, or the nearest kind that stderr can show.
-    pub(crate) fn new(kind: ProgressKind) -> Self {
+    pub(crate) fn new(kind: ProgressKind, verbosity: Verbosity) -> Self {
         let is_terminal = io::stderr().is_terminal();
         let is_dumb = std::env::var_os("TERM").is_none_or(|term| term == "dumb");
         let form = match kind {
@@ -94,7 +128,7 @@ impl Progress {
             ProgressKind::Auto | ProgressKind::Bar | ProgressKind::Plain => Form::Plain,
         };
         let next = form.interval();
-        Self { form, next }
+        Self { form, verbosity, next }
     }
 
     /// Whether it is time to show something.
@@ -110,10 +144,10 @@ impl Progress {
             Form::Bar(bar) => {
                 bar.set_length(1000);
                 bar.set_position((standing.share() * 1000.0) as u64);
-                bar.set_message(shown(&standing.line()).into_owned());
+                bar.set_message(shown(&line(standing, self.verbosity)).into_owned());
             }
-            Form::Plain => say(&standing.line()),
-            Form::Json => say(&standing.json_line()),
+            Form::Plain => say(&line(standing, self.verbosity)),
+            Form::Json => say(&json_line(standing)),
         }
     }
 
@@ -149,15 +183,6 @@ impl EvolutionProgress {
     fn per_s(&self) -> f64 {
         self.count as f64 / self.elapsed.as_secs_f64().max(1e-9)
     }
-
-    /// Seconds left until all is done or the time is up. Unknown without a time limit before anything was counted.
-    fn eta_s(&self) -> Option<f64> {
-        let left = self.planned.saturating_sub(self.count);
-        let is_known = left == 0 || self.count > 0;
-        let by_count = is_known.then(|| left as f64 / self.per_s().max(1e-9));
-        let by_time = self.time_limit.map(|limit| limit.saturating_sub(self.elapsed).as_secs_f64());
-        by_count.into_iter().chain(by_time).reduce(f64::min)
-    }
 }
 
 impl Stage for EvolutionProgress {
@@ -170,15 +195,23 @@ impl Stage for EvolutionProgress {
         self.eta_s().map_or(0.0, |eta_s| elapsed_s / (elapsed_s + eta_s).max(1e-9))
     }
 
-    fn line(&self) -> String {
-        let left = self.eta_s().map(|eta_s| format!(", {} left", short_time(eta_s))).unwrap_or_default();
+    /// Seconds left until all is done or the time is up. Unknown without a time limit before anything was counted.
+    fn eta_s(&self) -> Option<f64> {
+        let left = self.planned.saturating_sub(self.count);
+        let is_known = left == 0 || self.count > 0;
+        let by_count = is_known.then(|| left as f64 / self.per_s().max(1e-9));
+        let by_time = self.time_limit.map(|limit| limit.saturating_sub(self.elapsed).as_secs_f64());
+        by_count.into_iter().chain(by_time).reduce(f64::min)
+    }
+
+    fn details(&self) -> String {
         let unit = self.unit;
         let measure = match self.measure {
             Measure::Sae => "SAE",
             Measure::Objective => "objective",
         };
         format!(
-            "{}/{} {unit}, {measure} {}, {} {unit}/s{left}",
+            "{}/{} {unit}, {measure} {}, {} {unit}/s",
             HumanCount(self.count),
             HumanCount(self.planned),
             HumanCount(self.error),
@@ -186,40 +219,34 @@ impl Stage for EvolutionProgress {
         )
     }
 
-    fn json_line(&self) -> String {
-        let rounded = |value: f64| (value * 10.0).round() / 10.0;
+    fn json(&self) -> Map<String, Value> {
         let unit = self.unit;
         let measure = match self.measure {
             Measure::Sae => "sae",
             Measure::Objective => "objective",
         };
-        let mut line = json!({
-            unit: self.count,
-            format!("{unit}_planned"): self.planned,
-            measure: self.error,
-            format!("{unit}_per_s"): rounded(self.per_s()),
-            "elapsed_s": rounded(self.elapsed.as_secs_f64()),
-        });
-        if let Some(eta_s) = self.eta_s() {
-            line["eta_s"] = rounded(eta_s).into();
-        }
-        line.to_string()
+        Map::from_iter([
+            (unit.to_owned(), self.count.into()),
+            (format!("{unit}_planned"), self.planned.into()),
+            (measure.to_owned(), self.error.into()),
+            (format!("{unit}_per_s"), rounded(self.per_s(), 1).into()),
+        ])
     }
 }
 
 /// A bar without colours, so NO_COLOR needs no check.
 fn bar() -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:14} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style = ProgressStyle::with_template("{msg} {wide_bar}").unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::stderr()).with_style(style)
 }
 
-/// A time as `8s`, `2m10s` or `3h05m`.
+/// A time as `8 s`, `2 min 10 s` or `3 h 05 min`.
 pub(crate) fn short_time(seconds: f64) -> String {
     let seconds = seconds.ceil() as u64;
     match seconds {
-        0..60 => format!("{seconds}s"),
-        60..3_600 => format!("{}m{:02}s", seconds / 60, seconds % 60),
-        _ => format!("{}h{:02}m", seconds / 3_600, seconds % 3_600 / 60),
+        0..60 => format!("{seconds} s"),
+        60..3_600 => format!("{} min {:02} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {:02} min", seconds / 3_600, seconds % 3_600 / 60),
     }
 }
 
@@ -234,33 +261,37 @@ mod tests {
     }
 
     #[test]
-    fn a_plain_line_tells_births_fitness_rate_and_time_left() {
-        assert_eq!(standing().line(), "1,000/4,000 births, SAE 1,234,567, 100 births/s, 30s left");
+    fn a_line_for_people_begins_with_the_share_and_the_time_left() {
+        assert_eq!(line(&standing(), Verbosity::Normal), "25 % · 30 s left");
+        let more = line(&standing(), Verbosity::Verbose);
+        assert_eq!(more, "25 % · 30 s left · 1,000/4,000 births, SAE 1,234,567, 100 births/s");
         let searching = EvolutionProgress { unit: "evals", measure: Measure::Objective, ..standing() };
-        assert_eq!(searching.line(), "1,000/4,000 evals, objective 1,234,567, 100 evals/s, 30s left");
+        let more = line(&searching, Verbosity::Verbose);
+        assert_eq!(more, "25 % · 30 s left · 1,000/4,000 evals, objective 1,234,567, 100 evals/s");
     }
 
     #[test]
     fn the_time_left_ends_with_the_time_limit() {
         let limited = EvolutionProgress { time_limit: Some(Duration::from_secs(15)), ..standing() };
         assert_eq!(limited.eta_s(), Some(5.0));
-        assert_eq!(standing().eta_s().map(short_time).as_deref(), Some("30s"));
-        assert_eq!(short_time(129.5), "2m10s");
-        assert_eq!(short_time(11_100.0), "3h05m");
+        assert_eq!(standing().eta_s().map(short_time).as_deref(), Some("30 s"));
+        assert_eq!(short_time(129.5), "2 min 10 s");
+        assert_eq!(short_time(11_100.0), "3 h 05 min");
     }
 
     #[test]
     fn before_the_first_birth_the_time_left_is_left_out() {
         let idle = EvolutionProgress { count: 0, ..standing() };
-        assert_eq!(idle.line(), "0/4,000 births, SAE 1,234,567, 0 births/s");
-        assert!(!idle.json_line().contains("eta_s"), "{}", idle.json_line());
+        assert_eq!(line(&idle, Verbosity::Normal), "0 %");
+        assert!(!json_line(&idle).contains("eta_s"), "{}", json_line(&idle));
         assert_eq!(EvolutionProgress { time_limit: Some(Duration::from_secs(15)), ..idle }.eta_s(), Some(5.0));
     }
 
     #[test]
     fn a_line_of_json_has_numbers_only() {
-        let line: serde_json::Value = serde_json::from_str(&standing().json_line()).expect("it is JSON");
-        assert_eq!(line["births"], 1_000);
-        assert_eq!(line["eta_s"], 30.0);
+        let line: Value = serde_json::from_str(&json_line(&standing())).expect("it is JSON");
+        assert_eq!((&line["births"], &line["births_per_s"]), (&1_000.into(), &100.0.into()));
+        assert_eq!((&line["elapsed_s"], &line["eta_s"]), (&10.0.into(), &30.0.into()));
+        assert!(line.as_object().is_some_and(|line| line.values().all(Value::is_number)), "{line}");
     }
 }

@@ -68,9 +68,15 @@ struct TracedPainter {
 }
 
 impl Painter for TracedPainter {
-    fn draw(&mut self, population: &Population, canvas: &Canvas, supersampling: u32) -> Result<Mosaic> {
+    fn draw_watched(
+        &mut self,
+        population: &Population,
+        canvas: &Canvas,
+        supersampling: u32,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Mosaic> {
         let _span = self.tracer.span("draw").tell("width_px", canvas.width_px).tell("height_px", canvas.height_px);
-        self.painter.draw(population, canvas, supersampling)
+        self.painter.draw_watched(population, canvas, supersampling, watch)
     }
 }
 

@@ -71,6 +71,19 @@ pub(super) fn judge(options: &PictureOptions, prepared: &Prepared, on_exists: On
     Ok(Verdict::Write(to_write))
 }
 
+/// Whether one of these outputs is there and holds the result of other options or of another picture.
+pub(super) fn replaces_other_result(to_write: &[Destination], prepared: &Prepared) -> bool {
+    to_write.iter().any(|output| {
+        let story = story::story_of_file(output);
+        story.is_some_and(|story| !story.is_of(prepared.of_output(output).key()))
+    })
+}
+
+/// How many of these outputs are there.
+pub(super) fn count<'o>(outputs: impl Iterator<Item = &'o Destination>) -> usize {
+    outputs.filter(|output| output.path.symlink_metadata().is_ok()).count()
+}
+
 /// Refuses places that cannot be written to, before the work is done: folders, pipes, and anything below a file.
 fn check_place(output: &Destination) -> Result<()> {
     if output.is_stream() {

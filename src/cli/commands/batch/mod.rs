@@ -1,6 +1,7 @@
 //! `smalti batch`: many pictures, one after the other or side by side, and what became of each.
 
 mod crew;
+mod earlier;
 mod existing;
 mod gate;
 mod pipeline;
@@ -16,6 +17,9 @@ use std::process::ExitCode;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 
+use indicatif::HumanCount;
+
+use self::earlier::Earlier;
 use self::gate::Gate;
 use self::places::Taken;
 use self::schedule::Schedule;
@@ -27,10 +31,10 @@ use crate::cli::files::destination::Overwrite;
 use crate::cli::files::memory;
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::list::shard;
-use crate::cli::list::{self, BatchArgs, Item};
+use crate::cli::list::{self, BatchArgs, Item, OnExists};
 use crate::cli::terminal::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use crate::cli::terminal::progress::Progress;
-use crate::cli::terminal::{self, Verbosity, advice};
+use crate::cli::terminal::{self, Verbosity, advice, words};
 use crate::cli::trace;
 use crate::error::{Error, Result};
 use crate::output::Journal;
@@ -86,8 +90,12 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
     }
     taken.check_results(&results)?;
     let mut journal = places::prepare(args, &items, &results)?;
+    let earlier = Earlier::read(&results);
     if verbosity > Verbosity::Quiet && shard.is_some() {
         terminal::say(&format!("smalti: {} of {all} pictures are in this shard", items.len()));
+    }
+    if verbosity > Verbosity::Quiet {
+        say_existing(args.on_exists(), &items);
     }
     computing.start_threads()?;
     let begin = |path: &PathBuf| {
@@ -104,7 +112,8 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
         items: &items,
         workers: &workers,
         io_threads: threads::io_threads(args.io_threads, computing.thread_count(), items.len()),
-        on_exists: args.on_exists,
+        on_exists: args.on_exists(),
+        earlier: &earlier,
         shard,
         schedule: &Schedule::new(&items),
         gate: &Gate::new(memory::share_of_free()),
@@ -125,13 +134,29 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
     }
 }
 
+/// Says how many outputs are there already, and what becomes of them.
+fn say_existing(on_exists: OnExists, items: &[Item]) {
+    let outputs = || items.iter().flat_map(|item| &item.outputs);
+    let (count, all) = (existing::count(outputs()), outputs().count());
+    let rule = match on_exists {
+        OnExists::SkipSame => "those of the same options stay, and smalti's others are replaced",
+        OnExists::Overwrite => "all of them are replaced",
+        OnExists::Skip => "all of them stay",
+        OnExists::Error => return,
+    };
+    if count > 0 {
+        let outputs = words::counted(all as u64, "output");
+        terminal::say(&format!("smalti: {} of {outputs} are there already: {rule}", HumanCount(count as u64)));
+    }
+}
+
 /// Runs the pipeline, writes a row for each picture, and shows the progress.
 fn watch(pipeline: &Pipeline<'_>, journal: &mut Journal, args: &BatchArgs) -> (Summary, Option<Error>) {
     let mut overseer = Overseer {
         pipeline,
         journal,
         prints_rows: args.json,
-        progress: Progress::new(args.messages.progress.unless(args.messages.quiet)),
+        progress: Progress::new(args.messages.progress.unless(args.messages.quiet), args.messages.verbosity()),
         verbosity: args.messages.verbosity(),
         summary: Summary::begin(pipeline.items.len()),
         fatal: None,
@@ -160,6 +185,7 @@ impl Overseer<'_> {
                 Ok(Report::Warning(warning)) if self.verbosity > Verbosity::Quiet => {
                     self.progress.say(&format!("smalti: {warning}"));
                 }
+                Ok(Report::Replaced) => self.summary.replaced += 1,
                 Ok(Report::Warning(_)) | Err(RecvTimeoutError::Timeout) => {}
                 Ok(Report::Fatal(error)) => self.end_with(error),
                 Err(RecvTimeoutError::Disconnected) => return,
@@ -201,6 +227,7 @@ impl Overseer<'_> {
             let item = &self.pipeline.items[number];
             let after = item.after.clone().unwrap_or_default();
             let mut row = self.pipeline.row(item);
+            row.note_end();
             row.note_failure(&Error::input(&item.input, format!("comes after {after}, which failed; fix that first")));
             self.note(&row);
         }

@@ -21,9 +21,9 @@ use crate::cli::files::{memory, outputs};
 use crate::cli::jobs::prepared::Prepared;
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::list::Item;
-use crate::cli::terminal;
 use crate::cli::terminal::advice::why_no_vulkan;
 use crate::cli::terminal::aside::{self, Aside, unless_it_panics};
+use crate::cli::terminal::{self, Verbosity};
 use crate::error::{Error, Result};
 use crate::evolve::Ending;
 use crate::studio::{Device, Drawn};
@@ -154,11 +154,15 @@ impl<'a> Pipeline<'a> {
             Verdict::Write(to_write) => to_write,
             Verdict::Unchanged(story) => {
                 row.note_story(&story);
+                if let Some(figures) = self.earlier.figures(&row.id, row.key.as_deref()) {
+                    row.note_figures(figures);
+                }
                 (row.status, row.output) = (Status::Unchanged, paths());
                 return Ok(None);
             }
         };
-        Ok(Some(Work { options, prepared, to_write, permit }))
+        let replaces = existing::replaces_other_result(&to_write, &prepared);
+        Ok(Some(Work { options, prepared, to_write, replaces, permit }))
     }
 
     /// The work of a thread that evolves.
@@ -198,6 +202,9 @@ impl<'a> Pipeline<'a> {
                     row.save_ms = terminal::milliseconds(began.elapsed());
                     row.output = item.outputs.iter().map(|output| output.path.display().to_string()).collect();
                     row.status = Status::Complete;
+                    if work.replaces {
+                        let _ = reports.send(Report::Replaced);
+                    }
                     tell(reports, row);
                 }
                 Err(error) => self.fail(row, error, reports),
@@ -209,7 +216,7 @@ impl<'a> Pipeline<'a> {
     fn save(&self, work: &Work<'_>, ending: &Ending, drawn: &Drawn) -> Result<()> {
         let _span = self.tracer.span("save").tell("picture", work.prepared.id.as_str());
         let outputs: Vec<&Destination> = work.to_write.iter().collect();
-        let files = outputs::encode(&outputs, drawn, &work.prepared.provenances.told(ending))?;
+        let files = outputs::encode(&outputs, drawn, &work.prepared.provenances.told(ending), Verbosity::Quiet)?;
         for file in &files {
             existing::check_remade(file.destination, &file.bytes, self.on_exists)?;
         }

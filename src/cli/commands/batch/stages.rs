@@ -4,6 +4,7 @@ use std::sync::mpsc::{Sender, SyncSender};
 
 use rayon::ThreadPool;
 
+use super::earlier::Earlier;
 use super::gate::{Gate, Permit};
 use super::schedule::Schedule;
 use crate::cli::files::destination::Destination;
@@ -43,6 +44,8 @@ pub(super) struct Pipeline<'a> {
     /// How many threads read, and how many save.
     pub io_threads: IoThreads,
     pub on_exists: OnExists,
+    /// What earlier rows tell of results.
+    pub earlier: &'a Earlier,
     pub shard: Option<Shard>,
     pub schedule: &'a Schedule,
     pub gate: &'a Gate,
@@ -54,6 +57,8 @@ pub(super) struct Pipeline<'a> {
 /// What threads report: a row for every picture that was not interrupted, and further messages.
 pub(super) enum Report {
     Row(Box<Row>),
+    /// A result of other options was replaced.
+    Replaced,
     Warning(String),
     /// A failure that all further pictures would share.
     Fatal(Error),
@@ -64,6 +69,8 @@ pub(super) struct Work<'a> {
     pub options: PictureOptions,
     pub prepared: Prepared,
     pub to_write: Vec<Destination>,
+    /// Whether a result of other options is replaced.
+    pub replaces: bool,
     /// The memory that it may use until it is saved.
     pub permit: Permit<'a>,
 }
@@ -139,6 +146,7 @@ impl<'a> Pipeline<'a> {
 }
 
 /// Reports the row of a picture. The send cannot fail: the receiver listens until the last sender is gone.
-pub(super) fn tell(reports: &Sender<Report>, row: Row) {
+pub(super) fn tell(reports: &Sender<Report>, mut row: Row) {
+    row.note_end();
     let _ = reports.send(Report::Row(Box::new(row)));
 }

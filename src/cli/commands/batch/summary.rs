@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use indicatif::HumanCount;
-use serde_json::json;
+use serde_json::{Map, Value};
 
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::terminal;
@@ -21,6 +21,8 @@ pub(super) struct Summary {
     complete: usize,
     unchanged: usize,
     skipped: usize,
+    /// Results of other options that were replaced.
+    pub(super) replaced: usize,
     failures: Vec<String>,
     evals: u64,
     evolve_ms: f64,
@@ -35,6 +37,7 @@ impl Summary {
             complete: 0,
             unchanged: 0,
             skipped: 0,
+            replaced: 0,
             failures: Vec::new(),
             evals: 0,
             evolve_ms: 0.0,
@@ -87,6 +90,7 @@ impl Summary {
         let seconds = self.began.elapsed().as_secs_f64().max(1e-9);
         let counts = [
             ("complete", self.complete),
+            ("replaced", self.replaced),
             ("unchanged", self.unchanged),
             ("skipped", self.skipped),
             ("failed", self.failed()),
@@ -124,14 +128,6 @@ pub(super) struct BatchStanding {
     complete: usize,
 }
 
-impl BatchStanding {
-    /// Seconds left, estimated from the pictures that were evolved, since the others take no time.
-    fn eta_s(&self) -> Option<f64> {
-        let left = (self.planned - self.done) as f64;
-        (self.complete > 0).then(|| left * self.elapsed.as_secs_f64() / self.complete as f64)
-    }
-}
-
 impl Stage for BatchStanding {
     fn elapsed(&self) -> Duration {
         self.elapsed
@@ -141,23 +137,22 @@ impl Stage for BatchStanding {
         self.done as f64 / self.planned.max(1) as f64
     }
 
-    fn line(&self) -> String {
-        let left = self.eta_s().map(|eta_s| format!(", {} left", short_time(eta_s))).unwrap_or_default();
-        let failed = if self.failed > 0 { format!(", {} failed", self.failed) } else { String::new() };
-        format!("{}/{} pictures{failed}{left}", HumanCount(self.done as u64), HumanCount(self.planned as u64))
+    /// Estimated from the pictures that were evolved, since the others take no time.
+    fn eta_s(&self) -> Option<f64> {
+        let left = (self.planned - self.done) as f64;
+        (self.complete > 0).then(|| left * self.elapsed.as_secs_f64() / self.complete as f64)
     }
 
-    fn json_line(&self) -> String {
-        let rounded = |value: f64| (value * 10.0).round() / 10.0;
-        let mut line = json!({
-            "pictures": self.done,
-            "pictures_planned": self.planned,
-            "failed": self.failed,
-            "elapsed_s": rounded(self.elapsed.as_secs_f64()),
-        });
-        if let Some(eta_s) = self.eta_s() {
-            line["eta_s"] = rounded(eta_s).into();
-        }
-        line.to_string()
+    fn count(&self) -> String {
+        let failed = if self.failed > 0 { format!(", {} failed", self.failed) } else { String::new() };
+        format!("{}/{} pictures{failed}", HumanCount(self.done as u64), HumanCount(self.planned as u64))
+    }
+
+    fn json(&self) -> Map<String, Value> {
+        Map::from_iter([
+            ("pictures".to_owned(), self.done.into()),
+            ("pictures_planned".to_owned(), self.planned.into()),
+            ("failed".to_owned(), self.failed.into()),
+        ])
     }
 }

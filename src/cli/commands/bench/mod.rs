@@ -134,7 +134,7 @@ fn try_bench(args: &BenchArgs) -> Result<()> {
     let verbosity = if args.quiet { Verbosity::Quiet } else { Verbosity::Normal };
     let pictures = args.input.as_deref().map_or_else(Pictures::built_in, |path| Pictures::read(path, verbosity))?;
     let device = args.computing.begin(verbosity)?;
-    let progress = Progress::new(args.progress.unless(args.quiet));
+    let progress = Progress::new(args.progress.unless(args.quiet), verbosity);
     let measurements = Bench::new(&device, &pictures, args.time, progress).run(verbosity)?;
     let figures = Figures {
         schema: Figures::SCHEMA.to_owned(),

@@ -4,12 +4,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use indicatif::HumanCount;
-use serde_json::json;
+use serde_json::{Map, Value};
 
 use super::measure::{Lap, Measurement, Unit, repeat};
 use super::passes;
 use super::workload::{self, Pictures, SIDES_PX};
-use crate::cli::terminal::progress::{Progress, Stage, short_time};
+use crate::cli::terminal::progress::{Progress, Stage};
 use crate::cli::terminal::{self, Verbosity, advice};
 use crate::cpu::cells::CpuSearch;
 use crate::engine::Engine;
@@ -249,12 +249,6 @@ struct MeasurementsDone {
     steps: usize,
 }
 
-impl MeasurementsDone {
-    fn eta_s(&self) -> f64 {
-        self.elapsed.as_secs_f64() / self.steps as f64 * (STEPS - self.steps) as f64
-    }
-}
-
 impl Stage for MeasurementsDone {
     fn elapsed(&self) -> Duration {
         self.elapsed
@@ -264,19 +258,16 @@ impl Stage for MeasurementsDone {
         self.steps as f64 / STEPS as f64
     }
 
-    fn line(&self) -> String {
-        let count = |steps: usize| HumanCount(steps as u64);
-        format!("{}/{} measurements, {} left", count(self.steps), count(STEPS), short_time(self.eta_s()))
+    fn eta_s(&self) -> Option<f64> {
+        Some(self.elapsed.as_secs_f64() / self.steps as f64 * (STEPS - self.steps) as f64)
     }
 
-    fn json_line(&self) -> String {
-        let rounded = |value: f64| (value * 10.0).round() / 10.0;
-        json!({
-            "measurements": self.steps,
-            "measurement_count": STEPS,
-            "elapsed_s": rounded(self.elapsed.as_secs_f64()),
-            "eta_s": rounded(self.eta_s()),
-        })
-        .to_string()
+    fn count(&self) -> String {
+        let count = |steps: usize| HumanCount(steps as u64);
+        format!("{}/{} measurements", count(self.steps), count(STEPS))
+    }
+
+    fn json(&self) -> Map<String, Value> {
+        Map::from_iter([("measurements".to_owned(), self.steps.into()), ("measurement_count".to_owned(), STEPS.into())])
     }
 }

@@ -40,6 +40,7 @@ pub(crate) fn evolve(args: &EvolveArgs) -> ExitCode {
         row.note_failure(error);
         terminal::error(&advice::sentence(error));
     }
+    row.note_end();
     let printed = if args.json { row.print() } else { Ok(()) };
     if let Err(error) = &printed {
         terminal::error(&advice::sentence(error));
@@ -157,7 +158,7 @@ fn write(
     let Evolved { ending, drawn, curve, .. } = evolved;
     let kept = outputs_to_write(options, prepared, &ending);
     let encoding = picture.tracer.span("encode");
-    let mut encoded = outputs::encode(&kept, &drawn, &prepared.provenances.told(&ending))?;
+    let mut encoded = outputs::encode(&kept, &drawn, &prepared.provenances.told(&ending), picture.verbosity)?;
     drop(drawn);
     encoded.extend(encode_target(files, &prepared.job, &prepared.provenances.target)?);
     drop(encoding);

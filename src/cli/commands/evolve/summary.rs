@@ -4,87 +4,98 @@ use indicatif::{BinaryBytes, HumanCount};
 
 use crate::cli::jobs::options::PictureOptions;
 use crate::cli::jobs::row::{Row, Status};
-use crate::cli::terminal::{self, Verbosity};
+use crate::cli::terminal::{self, Verbosity, words};
 use crate::studio::{Job, SchemeSettings};
 
-/// The summary of a finished evolution.
+/// The summary of a finished evolution: one line, and with `--verbose` all figures before it.
 pub(super) fn print_summary(row: &Row, options: &PictureOptions, job: &Job) {
-    let count = |value: u64| HumanCount(value).to_string();
-    let sae = row.sae.unwrap_or_default();
-    let mean_error = sae as f64 / (job.target.pixels().len() as f64 * 3.0);
-    let psnr = row.psnr.map_or("infinite PSNR".to_owned(), |db| format!("PSNR {db:.2} dB"));
-    let seconds = row.evolve_ms / 1e3;
-    let psnr_line = format!("SAE {}, mean error {mean_error:.2} of 255 per channel, {psnr}", count(sae));
-    terminal::say(&format!("{}, {} tiles", size_line(options, job), count(job.fly_count as u64)));
-    let per_s = |value: u64| count((value as f64 / seconds.max(1e-6)) as u64);
-    let device = row.device.as_deref().unwrap_or_default();
-    match job.scheme {
-        SchemeSettings::Paper(_) => {
-            terminal::say(&psnr_line);
-            terminal::say(&format!(
-                "{} births ({} by the fallback), {} restarts, {seconds:.2} s, {} births/s on {device}",
-                count(row.births),
-                count(row.fallback_kills),
-                count(u64::from(row.restarts)),
-                per_s(row.births),
-            ));
-        }
-        SchemeSettings::Cells(_) => {
-            let objective = row.objective.filter(|&objective| u64::try_from(objective) != Ok(sae));
-            let objective =
-                objective.map_or(String::new(), |objective| format!(", objective {}", count(objective.unsigned_abs())));
-            terminal::say(&format!("{psnr_line}{objective}"));
-            terminal::say(&format!(
-                "{} evals, {} births, {seconds:.2} s, {} evals/s on {device}",
-                count(row.evals),
-                count(row.births),
-                per_s(row.evals),
-            ));
-        }
+    if options.verbosity == Verbosity::Verbose {
+        print_figures(row, options, job);
     }
-    let warming_up = match row.living.filter(|_| row.is_warming_up) {
+    let tiles = words::counted(job.fly_count as u64, "tile");
+    let likeness = row.psnr.map_or("without any error".to_owned(), |db| format!("{db:.1} dB"));
+    let stop = row.stop.as_deref().unwrap_or_default();
+    let ended = if is_as_planned(stop) { String::new() } else { format!(", ended {}", words::why_ended(stop)) };
+    let written = if row.output.is_empty() { "nothing".to_owned() } else { row.output.join(", ") };
+    let seconds = row.evolve_ms / 1e3;
+    terminal::say(&format!("wrote {written}: {tiles}, {likeness}, {seconds:.1} s{ended}{}", warming_up(row)));
+    if row.status == Status::Partial {
+        terminal::say("the mosaic is not finished: the same command starts over, and --init goes on from a .npz");
+    }
+}
+
+/// Whether a search that ended so did all that it was to do.
+fn is_as_planned(stop: &str) -> bool {
+    ["evals", "births"].contains(&stop)
+}
+
+/// What an early end left out of a run of the paper's scheme, as a clause.
+fn warming_up(row: &Row) -> String {
+    match row.living.filter(|_| row.is_warming_up) {
         Some(living) if Some(living) != row.tiles => {
-            format!(" before the last split or change of masks, with {} tiles alive", count(living as u64))
+            let living = words::counted(living as u64, "tile");
+            format!(" before the last split or change of masks, with {living} alive")
         }
         Some(_) => " before the last change of masks".to_owned(),
         None => String::new(),
-    };
-    terminal::say(&format!("seed {}, stopped by {}{warming_up}", row.seed, row.stop.as_deref().unwrap_or_default()));
-    if options.verbosity == Verbosity::Verbose {
-        terminal::say(&format!("read in {:.0} ms, encoded and written in {:.0} ms", row.load_ms, row.save_ms));
-        terminal::say(&format!("SHA-256 of the input {}", job.input_sha256));
-        terminal::say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
     }
-    if let Some(look) = look_line(options, job) {
-        terminal::say(&look);
-    }
-    let partial = if row.status == Status::Partial {
-        " (partial; the same command starts over, and --init goes on from a .npz)"
-    } else {
-        ""
-    };
-    let written = if row.output.is_empty() { "nothing".to_owned() } else { row.output.join(", ") };
-    terminal::say(&format!("wrote {written}{partial}"));
+}
+
+/// All figures.
+fn print_figures(row: &Row, options: &PictureOptions, job: &Job) {
+    let count = |value: u64| HumanCount(value).to_string();
+    let sae = row.sae.unwrap_or_default();
+    let mean_error = sae as f64 / (job.target.pixels().len() as f64 * 3.0);
+    let seconds = row.evolve_ms / 1e3;
+    let per_s = |value: u64| count((value as f64 / seconds.max(1e-6)) as u64);
+    let objective = row.objective.filter(|&objective| u64::try_from(objective) != Ok(sae));
+    let objective =
+        objective.map_or(String::new(), |objective| format!(", objective {}", count(objective.unsigned_abs())));
+    terminal::say(&size_line(options, job));
+    terminal::say(&format!("SAE {}, mean error {mean_error:.2} of 255 per channel{objective}", count(sae)));
+    let device = row.device.as_deref().unwrap_or_default();
+    terminal::say(&match job.scheme {
+        SchemeSettings::Paper(_) => format!(
+            "{} ({} by the fallback), {}, {} births/s on {device}",
+            words::counted(row.births, "birth"),
+            count(row.fallback_kills),
+            words::counted(row.restarts.into(), "restart"),
+            per_s(row.births),
+        ),
+        SchemeSettings::Cells(_) => format!(
+            "{}, {}, {} evals/s on {device}",
+            words::counted(row.evals, "eval"),
+            words::counted(row.births, "birth"),
+            per_s(row.evals),
+        ),
+    });
+    terminal::say(&format!("seed {}, ended {}", row.seed, words::why_ended(row.stop.as_deref().unwrap_or_default())));
+    terminal::say(&format!("read in {:.0} ms, encoded and written in {:.0} ms", row.load_ms, row.save_ms));
+    terminal::say(&format!("SHA-256 of the input {}", job.input_sha256));
+    terminal::say(&format!("key of the result {}", row.key.as_deref().unwrap_or_default()));
+    look_line(options, job).iter().for_each(|look| terminal::say(look));
 }
 
 /// The text of a dry run.
 pub(super) fn print_plan(row: &Row, options: &PictureOptions, job: &Job, memory_bytes: u64) {
-    let begin = options.settings.init_file().map(|path| path.display().to_string());
+    let begin = options.settings.init_file().map(|path| format!("those of {} at first", path.display()));
     terminal::say(&size_line(options, job));
     let fly_count = HumanCount(job.fly_count as u64);
     match &job.scheme {
         SchemeSettings::Paper(scheme) => {
-            terminal::say(&format!("tiles      {fly_count} from {}", begin.as_deref().unwrap_or("random")));
+            let begin = begin.unwrap_or_else(|| "at random at first".to_owned());
+            terminal::say(&format!("tiles      {fly_count}, {begin}"));
             terminal::say(&format!(
-                "births     {} in each of {} runs, {} at a time, scheme paper, seed {}",
+                "births     {} in each of {}, {} at a time, scheme paper, seed {}",
                 HumanCount(scheme.births),
-                u64::from(scheme.restarts) + 1,
+                words::counted(u64::from(scheme.restarts) + 1, "run"),
                 scheme.batch_births,
                 row.seed
             ));
         }
         SchemeSettings::Cells(cells) => {
-            terminal::say(&format!("tiles      {fly_count} from {}", begin.as_deref().unwrap_or("none")));
+            let begin = begin.map_or_else(String::new, |begin| format!(", {begin}"));
+            terminal::say(&format!("tiles      {fly_count}{begin}"));
             let evals = HumanCount(cells.budget(job.fly_count).evals);
             terminal::say(&format!("evals      {evals}, scheme cells, seed {}", row.seed));
         }

@@ -11,10 +11,11 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 
-use crate::cli::files::destination;
+use crate::cli::files::destination::{self, Destination};
 use crate::cli::files::places::{Inputs, place_of};
+use crate::cli::files::story::{Story, story_of_file};
 use crate::cli::list;
-use crate::cli::list::rows::{self, ResultRow, Rows};
+use crate::cli::list::rows::{self, ResultRow, RowParts, Rows};
 use crate::cli::terminal;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::error::{Error, Result};
@@ -26,8 +27,8 @@ const EXIT_SOME_FAILED: u8 = 3;
 const NAMED_MAX: usize = 10;
 
 const AFTER_HELP: &str = "\
-Of several rows of one picture, the last of a file counts; between files a row that tells of a success (complete, unchanged,
-skipped) beats one that does not, and else that of the file named later counts.
+Of several rows of one picture the newest counts. In one file that is the last. A row whose file holds another result
+by now is told.
 
 Exit codes: 0 every picture is there, 1 the output cannot be written, 2 wrong usage or unreadable input, 3 some pictures
 failed or are missing.
@@ -102,6 +103,7 @@ fn merge_all(args: &MergeArgs) -> Result<ExitCode> {
     let failed: Vec<&ResultRow> = rows.iter().filter(|row| !row.told.is_success()).collect();
     tell_failed(&failed);
     tell_missing(&missing, expected.len());
+    tell_stale(&rows);
     Ok(ExitCode::from(if failed.is_empty() && missing.is_empty() { 0 } else { EXIT_SOME_FAILED }))
 }
 
@@ -127,6 +129,29 @@ fn tell_missing(missing: &[&str], expected_count: usize) {
     let named = missing.iter().take(NAMED_MAX).copied().collect::<Vec<_>>().join(", ");
     let more = if missing.len() > NAMED_MAX { ", .." } else { "" };
     terminal::say(&format!("missing {} of {expected_count} pictures: {named}{more}", missing.len()));
+}
+
+/// Tells of rows whose files hold another result now, as far as the files are there.
+fn tell_stale(rows: &[ResultRow]) {
+    let stale: Vec<(&ResultRow, &PathBuf)> =
+        rows.iter().filter_map(|row| Some((row, stale_file(&row.told)?))).collect();
+    for (row, file) in stale.iter().take(NAMED_MAX) {
+        let (id, file) = (&row.told.id, file.display());
+        terminal::error(&format!("{id}: its row tells of another result than {file} holds; run the batch again"));
+    }
+    if stale.len() > NAMED_MAX {
+        terminal::error(&format!("and {} more rows tell of other results than their files", stale.len() - NAMED_MAX));
+    }
+}
+
+/// The first file of a row, if files of it tell of results, and none of them of that of the row.
+fn stale_file(told: &RowParts) -> Option<&PathBuf> {
+    let key = told.key.as_deref().filter(|_| told.is_success())?;
+    let stories =
+        told.output.iter().filter_map(|path| Some((path, story_of_file(&Destination::for_result(path).ok()?)?)));
+    let stories: Vec<(&PathBuf, Story)> = stories.collect();
+    let is_there = stories.iter().any(|(_, story)| story.is_of(key));
+    stories.first().filter(|_| !is_there).map(|(path, _)| *path)
 }
 
 /// The files to merge. A named folder stands for the files in it that are named like result rows, in natural order. An

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use clap::{ArgGroup, Args};
 
-use self::scripts::{Plan, quoted};
+use self::scripts::Plan;
 use crate::cli::args::typed::Typed;
 use crate::cli::files::destination::{Destination, Overwrite};
 use crate::cli::files::places::{self, Inputs};
@@ -20,7 +20,7 @@ use crate::cli::list::shard::{self, SHARD_COUNT_MAX};
 use crate::cli::list::{self, BatchArgs, Item, ManifestRow};
 use crate::cli::terminal::{self, Verbosity};
 use crate::cli::trace::Tracer;
-use crate::cli::values::{self, in_range};
+use crate::cli::values::{self, in_range, quoted};
 use crate::error::{Error, Result};
 
 /// A shard with less work than this, in seconds, costs a cluster too much compared with its work.

@@ -5,6 +5,8 @@
 
 use std::fmt::Write;
 
+use crate::cli::values::quoted;
+
 /// Least digits of the numbers in the names of shards.
 const DIGITS_MIN: usize = 4;
 /// Most pods at a time in a Kubernetes job, unless the user edits it.
@@ -252,15 +254,6 @@ pub(super) fn can_hold(text: &str) -> bool {
     !text.chars().any(|char| char.is_control() || "\u{2028}\u{2029}\u{FEFF}\u{FFFE}\u{FFFF}".contains(char))
 }
 
-/// A word, quoted for a shell.
-pub(super) fn quoted(text: &str) -> String {
-    let is_plain = |char: char| char.is_ascii_alphanumeric() || "-_./=:,+@%".contains(char);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        return text.to_owned();
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
-}
-
 /// A string for YAML. JSON strings are valid there.
 fn json(text: &str) -> String {
     serde_json::Value::from(text).to_string()
@@ -280,15 +273,6 @@ mod tests {
             flags: ["--style=mosaic", "--palette=it's.gpl"].map(str::to_owned).to_vec(),
             item_count: 24_000,
             shard_count: 12,
-        }
-    }
-
-    #[test]
-    fn a_word_is_quoted_for_a_shell_where_it_must_be() {
-        assert_eq!(quoted("--style=mosaic"), "--style=mosaic");
-        assert_eq!(quoted("/a/b_c-1.png"), "/a/b_c-1.png");
-        for (text, expected) in [("", "''"), ("a b", "'a b'"), ("$x", "'$x'"), ("it's", r"'it'\''s'"), ("*", "'*'")] {
-            assert_eq!(quoted(text), expected);
         }
     }
 

@@ -40,6 +40,7 @@ Exit codes: 0 all were scored, 2 none could be, 3 some could not be.
 Examples:
   smalti evolve photo.jpg -o mosaic.png --save-target target.png
   smalti score target.png mosaic.png
+  smalti score photo.jpg mosaic.png --fit
   smalti score target.png a.png b.png c.jpg --json > scores.json
   smalti score --flicker frames mosaic-frames
   smalti score logo.png mosaic.png --background white";
@@ -59,6 +60,9 @@ pub(crate) struct ScoreArgs {
     /// Largest change of a channel of REF, 0 to 255, of a pixel that counts as still
     #[arg(long, value_name = "T", default_value_t = 12, requires = "flicker")]
     pub still: u8,
+    /// Reduce REF to the size of OUT first, as `evolve` reduces its input
+    #[arg(long, conflicts_with = "flicker")]
+    pub fit: bool,
     /// Print a JSON array to stdout, one object for each OUT that could be scored, instead of a table
     #[arg(long)]
     pub json: bool,
@@ -141,8 +145,11 @@ pub(crate) fn score(args: &ScoreArgs) -> ExitCode {
 }
 
 fn score_all(args: &ScoreArgs) -> Result<ExitCode> {
-    let photo = read(&args.reference, args.background)?;
-    let reference = Reference::new(picture(&photo)).map_err(|reason| Error::input(&args.reference, reason))?;
+    if args.fit {
+        return score_each(args, |path| score_fitted(args, path), table);
+    }
+    let photo = read(&args.reference, None, args.background)?;
+    let reference = reference(args, &photo)?;
     score_each(args, |path| score_one(&reference, path, args.background), table)
 }
 
@@ -172,16 +179,39 @@ pub(crate) fn score_each<R: Serialize>(
     Ok(ExitCode::from(if some_failed { EXIT_SOME_FAILED } else { worst }))
 }
 
+fn reference<'p>(args: &ScoreArgs, photo: &'p Photo) -> Result<Reference<'p>> {
+    Reference::new(picture(photo)).map_err(|reason| Error::input(&args.reference, reason))
+}
+
 fn score_one(reference: &Reference<'_>, path: &Path, background: Rgb) -> Result<ScoreRow> {
-    let photo = read(path, background)?;
-    let score = reference.score(picture(&photo)).map_err(|reason| Error::input(path, reason))?;
+    let photo = read(path, None, background)?;
+    let score = reference.score(picture(&photo)).map_err(|reason| {
+        let advice = if reason.contains("the reference") { "; --fit reduces the reference to its size" } else { "" };
+        Error::input(path, reason + advice)
+    })?;
     Ok(ScoreRow::new(path, &photo, &score))
 }
 
-/// Reads a picture, and prints a warning about what was ignored in it.
-pub(crate) fn read(path: &Path, background: Rgb) -> Result<Photo> {
-    let loaded =
-        photo::read(path, &ReadOptions { background: Background::Color(background), ..ReadOptions::default() })?;
+/// Scores a picture against the reference at the picture's size.
+fn score_fitted(args: &ScoreArgs, path: &Path) -> Result<ScoreRow> {
+    let photo = read(path, None, args.background)?;
+    let fitted = read(&args.reference, Some(photo.width_px.max(photo.height_px)), args.background)?;
+    let (fitted_px, photo_px) = ((fitted.width_px, fitted.height_px), (photo.width_px, photo.height_px));
+    if fitted_px.0 < photo_px.0 && fitted_px.1 < photo_px.1 {
+        let reason = format!(
+            "has {}x{} px, more than the reference with {}x{} px, which --fit does not enlarge; draw the mosaic smaller",
+            photo_px.0, photo_px.1, fitted_px.0, fitted_px.1
+        );
+        return Err(Error::input(path, reason));
+    }
+    let score = reference(args, &fitted)?.score(picture(&photo)).map_err(|reason| Error::input(path, reason))?;
+    Ok(ScoreRow::new(path, &photo, &score))
+}
+
+/// Reads a picture, reduced to a longer side if one is given, and prints a warning about what was ignored in it.
+pub(crate) fn read(path: &Path, long_side_px: Option<u32>, background: Rgb) -> Result<Photo> {
+    let background = Background::Color(background);
+    let loaded = photo::read(path, &ReadOptions { background, long_side_px, ..ReadOptions::default() })?;
     for warning in &loaded.warnings {
         terminal::error(&format!("{}: {warning}", path.display()));
     }

@@ -16,6 +16,17 @@ pub(crate) enum Spacing {
     Snapshots,
 }
 
+impl Spacing {
+    /// The word for it on the command line and in metadata.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Error => "error",
+            Self::Births => "births",
+            Self::Snapshots => "snapshots",
+        }
+    }
+}
+
 /// Indices of the snapshots to show, in ascending order: the first, the last, and between them those nearest to an even
 /// course of `frame_count` frames. No snapshot is shown twice, so there may be fewer frames.
 ///

@@ -16,7 +16,7 @@ use crate::cli::files::snapshots::{self, Snapshot};
 use crate::cli::film::{self, Camera, End, Film, Shown};
 use crate::cli::terminal::interrupt::{EXIT_INTERRUPTED, Interrupt};
 use crate::cli::terminal::progress::Progress;
-use crate::cli::terminal::{self, advice};
+use crate::cli::terminal::{self, Verbosity, advice, words};
 use crate::error::Result;
 use crate::model::{Backdrop, Canvas};
 
@@ -62,7 +62,7 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
     let films = options.outputs.iter().map(open).collect::<Result<Vec<_>>>()?;
 
     let paths: Vec<&Path> = snapshots.iter().map(|snapshot| snapshot.path.as_path()).collect();
-    let progress = Progress::new(options.progress);
+    let progress = Progress::new(options.progress, Verbosity::Normal);
     let (end, films) = film::shoot(films, &paths, &mut camera, &interrupt, progress)?;
     if end == End::Interrupted {
         return Ok(end);
@@ -82,10 +82,7 @@ fn animate(options: &TimelapseOptions) -> Result<End> {
 fn say_written(paths: &[String], frame_count: usize, canvas: &Canvas, options: &TimelapseOptions) {
     let timing = options.timing(frame_count);
     let seconds = (frame_count - 1) as f64 / f64::from(timing.frames_per_s) + f64::from(timing.last_cs) / 100.0;
-    let frames = if frame_count == 1 { "frame" } else { "frames" };
+    let frames = words::counted(frame_count as u64, "frame");
     let (width_px, height_px) = (canvas.width_px, canvas.height_px);
-    terminal::say(&format!(
-        "wrote {}: {frame_count} {frames} of {width_px}x{height_px} px, {seconds:.1} s",
-        paths.join(", ")
-    ));
+    terminal::say(&format!("wrote {}: {frames} of {width_px}x{height_px} px, {seconds:.1} s", paths.join(", ")));
 }

@@ -3,7 +3,6 @@
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
-use super::frames::Spacing;
 use super::options::TimelapseOptions;
 use crate::archive;
 use crate::cli::files::snapshots::Snapshot;
@@ -15,6 +14,14 @@ use crate::studio::{SOFTWARE, hexadecimal};
 
 /// Metadata that differ from snapshot to snapshot.
 const OF_SNAPSHOT: [&str; 8] = ["births", "evals", "sae", "objective", "run", "status", "version", "software"];
+
+/// What was asked for of an animation, without what was not.
+fn without_null(mut value: Value) -> Value {
+    if let Value::Object(map) = &mut value {
+        map.retain(|_, value| !value.is_null());
+    }
+    value
+}
 
 /// Everything that decides an animation of these snapshots: their evolution, which of them are shown, and how.
 ///
@@ -30,16 +37,18 @@ pub(super) fn of_animation(
     let run_key = told.remove("key");
     let evals: Vec<u64> = snapshots.iter().map(|snapshot| snapshot.evals).collect();
     let Frames { size_px: (width_px, height_px), timing, has_alpha } = *frames;
+    let background = options.background.map(|background| match background {
+        Backdrop::Color(color) => hexadecimal(&color),
+        Backdrop::Transparent => "none".to_owned(),
+    });
+    let spacing = options.spacing.word();
     let specific = json!({
         "content": "timelapse",
         "run_key": run_key,
         "width_px": width_px,
         "height_px": height_px,
-        "background": options.background.map(|background| match background {
-            Backdrop::Color(color) => hexadecimal(&color),
-            Backdrop::Transparent => "none".to_owned(),
-        }),
-        "spacing": match options.spacing { Spacing::Error => "error", Spacing::Births => "births", Spacing::Snapshots => "snapshots" },
+        "background": background,
+        "spacing": spacing,
         "frames_per_s": timing.frames_per_s,
         "last_cs": timing.last_cs,
         "plays": timing.plays,
@@ -51,6 +60,16 @@ pub(super) fn of_animation(
     if has_alpha {
         told.insert("transparent".to_owned(), true.into());
     }
+    let animation = json!({
+        "output-size": options.long_side_px,
+        "background": background,
+        "fps": timing.frames_per_s,
+        "frames": options.frame_count,
+        "spacing": spacing,
+        "hold": f64::from(timing.last_cs) / 100.0,
+        "loop": timing.plays,
+    });
+    told.insert("animation".to_owned(), without_null(animation));
     told.sort_keys();
     let key = hexadecimal(&Sha256::digest(Value::Object(told.clone()).to_string()));
     told.remove("births_shown");

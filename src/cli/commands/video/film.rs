@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-use super::options::VideoOptions;
+use super::options::{Leash, Limit, NOISE, SCENE_CUT, VideoOptions, WarmStart};
 use super::plan::Planned;
 use super::store::Store;
 use crate::archive;
@@ -14,6 +14,7 @@ use crate::cli::terminal::Verbosity;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::Progress;
 use crate::error::{Error, Result};
+use crate::model::fly::UNITS_PER_PX;
 use crate::photo::Timing;
 use crate::studio::{Device, Provenance, hexadecimal};
 
@@ -45,6 +46,8 @@ fn provenance(options: &VideoOptions, sequence: Sequence<'_>) -> AnimationProven
         "frames_sha256": hexadecimal(&digest),
         "frames_per_s": options.rate(input_frames_per_s),
         "output_size_px": options.pictures.output_long_side_px,
+        "recipe": planned.first().map(|frame| frame.picture.decisive("recipe")),
+        "animation": asked(options, options.rate(input_frames_per_s)),
     });
     let mut told: Map<String, Value> = if let Value::Object(told) = told { told } else { Map::new() };
     if has_alpha(planned) {
@@ -53,6 +56,26 @@ fn provenance(options: &VideoOptions, sequence: Sequence<'_>) -> AnimationProven
     let provenance = Provenance::of(told);
     let text = Value::Object(provenance.describe(None)).to_string();
     AnimationProvenance { key: provenance.key().to_owned(), text }
+}
+
+/// What was asked for of a sequence beyond its pictures, where it is not the default; under the names of the flags.
+fn asked(options: &VideoOptions, frames_per_s: u16) -> Map<String, Value> {
+    let told = json!({
+        "fps": frames_per_s,
+        "warm-start": (options.warm_start == WarmStart::Off).then_some("off"),
+        "warm-evals": options.warm_evals,
+        "scene-cut": match options.scene_cut {
+            Limit::At(SCENE_CUT) => None,
+            Limit::At(most) => Some(most.to_string()),
+            Limit::Off => Some("off".to_owned()),
+        },
+        "keyframe-every": options.keyframe_every,
+        "noise": Some(options.noise).filter(|&noise| u64::from(noise) != NOISE),
+        "max-tile-move": options.max_tile_move.map(|Leash(units)| f64::from(units) / f64::from(UNITS_PER_PX)),
+        "frames": options.span.map(|span| format!("{}..{}", span.first, span.end)),
+    });
+    let told = if let Value::Object(told) = told { told } else { Map::new() };
+    told.into_iter().filter(|(_, value)| !value.is_null()).collect()
 }
 
 /// Whether some frame may be transparent.
@@ -92,7 +115,13 @@ pub(super) fn make(
     }
     let open = |output| Film::open(output, frames, &provenance);
     let films = options.films.iter().map(open).collect::<Result<Vec<_>>>()?;
-    let (end, films) = film::shoot(films, &paths, &mut camera, interrupt, Progress::new(options.progress))?;
+    let (end, films) = film::shoot(
+        films,
+        &paths,
+        &mut camera,
+        interrupt,
+        Progress::new(options.progress, options.pictures.verbosity),
+    )?;
     if end == End::Interrupted {
         return Err(Error::Interrupted);
     }

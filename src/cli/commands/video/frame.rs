@@ -182,7 +182,7 @@ impl<'a> Shooter<'a> {
         let mut drawn = Drawn { population, marginal, view, picture, layers: None };
         drawn.draw(&mut *self.painter, destination::pieces(&destinations))?;
         let destinations: Vec<_> = destinations.iter().collect();
-        let files: Vec<EncodedFile<'_>> = outputs::encode(&destinations, &drawn, &told)?;
+        let files: Vec<EncodedFile<'_>> = outputs::encode(&destinations, &drawn, &told, Verbosity::Quiet)?;
         files.iter().try_for_each(|file| self.store.check_remade(file))?;
         let mut paths = Vec::new();
         outputs::write(&files, watcher.interrupt, &mut paths).map(|()| paths)

@@ -104,11 +104,13 @@ fn shoot_all(options: &VideoOptions, args: &VideoArgs, totals: &mut Totals) -> R
     totals.shots = planned.chunk_by(|one, other| one.shot == other.shot).count();
 
     let mut shooter = Shooter::open(options, &planned, &store, &device, &interrupt)?;
-    let mut watcher = Watcher::begin(&interrupt, Progress::new(options.progress), planned.len());
+    let mut watcher =
+        Watcher::begin(&interrupt, Progress::new(options.progress, options.pictures.verbosity), planned.len());
     let made = planned.iter().try_for_each(|frame| {
         interrupt.check()?;
         watcher.evals = frame.evals;
-        let Made { row, is_kept } = make_frame(&mut shooter, &store, frame, &mut watcher)?;
+        let Made { mut row, is_kept } = make_frame(&mut shooter, &store, frame, &mut watcher)?;
+        row.note_end();
         let row = FrameRow { row: &row, frame: frame.number, begin: frame.begin, shot: frame.shot, is_kept };
         totals.note(&row);
         if args.json { terminal::print_json(&row) } else { Ok(()) }

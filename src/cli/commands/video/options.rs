@@ -1,6 +1,7 @@
 //! The options of `smalti video`.
 
 use std::ffi::OsStr;
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -22,7 +23,9 @@ use crate::studio::Scheme;
 use crate::vk::Validation;
 
 /// Default mean difference that counts as noise.
-const NOISE: u64 = 6;
+pub(super) const NOISE: u64 = 6;
+/// Default mean difference above which a frame begins a shot.
+pub(super) const SCENE_CUT: u32 = 32;
 /// Frames per second of a sequence without a rate.
 const FRAMES_PER_S: u64 = 25;
 
@@ -75,7 +78,7 @@ pub(crate) struct VideoArgs {
     #[arg(long, value_name = "E", value_parser = values::count, help_heading = "Sequence")]
     pub warm_evals: Option<u64>,
     /// Mean difference of two frames, 0 to 255, above which the second begins a shot, and begins anew; or off
-    #[arg(long, value_name = "T", value_parser = cut, default_value = "32", help_heading = "Sequence")]
+    #[arg(long, value_name = "T", value_parser = cut, default_value_t = Limit::At(SCENE_CUT), help_heading = "Sequence")]
     pub scene_cut: Limit,
     /// Begin anew every so many frames of a shot, at least 1 [default: never]
     #[arg(long, value_name = "K", value_parser = values::count, help_heading = "Sequence")]
@@ -120,6 +123,15 @@ pub(crate) enum WarmStart {
 pub(crate) enum Limit {
     At(u32),
     Off,
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::At(value) => value.fmt(out),
+            Self::Off => out.write_str("off"),
+        }
+    }
 }
 
 /// A distance in 1/64 px, at least 1.

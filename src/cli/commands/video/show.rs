@@ -4,13 +4,13 @@ use std::time::{Duration, Instant};
 
 use indicatif::HumanCount;
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Map, Value};
 
 use super::plan::{Begin, Planned};
 use crate::cli::jobs::row::Row;
-use crate::cli::terminal;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::cli::terminal::progress::{Progress, Stage, short_time};
+use crate::cli::terminal::progress::{Progress, Stage};
+use crate::cli::terminal::{self, words};
 use crate::error::Result;
 use crate::evolve::{Observer, Seen, StopReason};
 
@@ -67,17 +67,15 @@ impl Totals {
             side("width_px") * side("height_px")
         });
         let mean = self.sae as f64 / (self.frames.max(1) as f64 * 3.0 * pixels.max(1) as f64);
-        let count = |number: usize| HumanCount(number as u64);
-        terminal::say(&format!(
-            "{} frames in {} shots, {} of them there already; mean error {mean:.2} of 255 per channel",
-            count(self.frames),
-            count(self.shots),
-            count(self.kept)
-        ));
-        let (evals, seconds) = (HumanCount(self.evals), self.wall_ms / 1e3);
-        terminal::say(&format!("{evals} evals, {seconds:.1} s"));
+        let frames = words::counted(self.frames as u64, "frame");
+        let shots = words::counted(self.shots as u64, "shot");
+        let kept = HumanCount(self.kept as u64);
+        let kept = if self.kept > 0 { format!(", {kept} of them there already") } else { String::new() };
         let written: Vec<String> = folder.into_iter().chain(self.output.iter().cloned()).collect();
-        terminal::say(&format!("wrote {}", written.join(", ")));
+        let (written, seconds) = (written.join(", "), self.wall_ms / 1e3);
+        terminal::say(&format!(
+            "wrote {written}: {frames} in {shots}{kept}, mean error {mean:.2} of 255 per channel, {seconds:.1} s"
+        ));
     }
 }
 
@@ -135,13 +133,6 @@ struct FramesDone {
     part: f64,
 }
 
-impl FramesDone {
-    fn eta_s(&self) -> f64 {
-        let left = (self.count - self.done) as f64 - self.part;
-        self.elapsed.as_secs_f64() / (self.evolved as f64 + self.part).max(1e-3) * left
-    }
-}
-
 impl Stage for FramesDone {
     fn elapsed(&self) -> Duration {
         self.elapsed
@@ -151,14 +142,17 @@ impl Stage for FramesDone {
         (self.done as f64 + self.part) / self.count as f64
     }
 
-    fn line(&self) -> String {
-        let count = |frames: usize| HumanCount(frames as u64);
-        format!("{}/{} frames, {} left", count(self.done), count(self.count), short_time(self.eta_s()))
+    fn eta_s(&self) -> Option<f64> {
+        let left = (self.count - self.done) as f64 - self.part;
+        Some(self.elapsed.as_secs_f64() / (self.evolved as f64 + self.part).max(1e-3) * left)
     }
 
-    fn json_line(&self) -> String {
-        let rounded = |value: f64| (value * 10.0).round() / 10.0;
-        let (elapsed_s, eta_s) = (rounded(self.elapsed.as_secs_f64()), rounded(self.eta_s()));
-        json!({"frames": self.done, "frame_count": self.count, "elapsed_s": elapsed_s, "eta_s": eta_s}).to_string()
+    fn count(&self) -> String {
+        let count = |frames: usize| HumanCount(frames as u64);
+        format!("{}/{} frames", count(self.done), count(self.count))
+    }
+
+    fn json(&self) -> Map<String, Value> {
+        Map::from_iter([("frames".to_owned(), self.done.into()), ("frame_count".to_owned(), self.count.into())])
     }
 }
