@@ -7,6 +7,7 @@ use sha2::{Digest, Sha256};
 
 use super::cells::CellsSettings;
 use super::decimal::{of_units, shortest};
+use super::hashes::population_sha256;
 use super::hex::hexadecimal;
 use super::job::Job;
 use super::look::{Dress, Look, Mask};
@@ -40,8 +41,7 @@ pub(super) fn asked(settings: &Settings, job: &Job, resized_px: Option<u32>) -> 
     let mut told = Told::new();
     let long_side_px = job.target.width_px().max(job.target.height_px());
     tell(&mut told, "size", Some(long_side_px).filter(|&px| u64::from(px) != LONG_SIDE_PX));
-    let init =
-        job.init.as_deref().map(|population| HASH.to_owned() + &super::provenance::population_sha256(population));
+    let init = job.init.as_deref().map(|population| HASH.to_owned() + &population_sha256(population));
     tell(&mut told, "tiles", init.is_none().then_some(job.fly_count));
     tell(&mut told, "init", init);
     let weight = job.target.weights().map(|weights| HASH.to_owned() + &hexadecimal(&Sha256::digest(weights)));

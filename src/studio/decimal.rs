@@ -22,9 +22,14 @@ mod tests {
 
     #[test]
     fn the_decimal_of_fewest_digits_that_is_read_back_is_taken() {
-        for (units, scale, decimal) in
-            [(0, 256.0, 0.0), (1, 256.0, 0.004), (154, 256.0, 0.6), (409, 256.0, 1.6), (6_554, 65_536.0, 0.1)]
-        {
+        for (units, scale, decimal) in [
+            (0, 256.0, 0.0),
+            (1, 256.0, 0.004),
+            (154, 256.0, 0.6),
+            (410, 256.0, 1.6),
+            (409, 256.0, 1.598),
+            (6_554, 65_536.0, 0.1),
+        ] {
             assert_eq!(of_units(units, scale), decimal, "{units} / {scale}");
         }
         for units in 0..=65_536 {

@@ -21,6 +21,7 @@ mod device;
 mod drawing;
 mod fitted;
 mod grout;
+mod hashes;
 mod hex;
 mod job;
 mod look;
@@ -60,6 +61,7 @@ pub(crate) use self::cells::CellsSettings;
 pub(crate) use self::choices::Colors;
 pub(crate) use self::device::{OpenedSearch, PipelineKeeper, select, select_all};
 pub(crate) use self::drawing::{Content, Drawn, Pieces, SUPERSAMPLING_MAX, View, difference, usual_supersampling};
+pub(crate) use self::hashes::population_sha256;
 pub(crate) use self::hex::hexadecimal;
 pub(crate) use self::job::{Job, default_fly_count};
 pub(crate) use self::look::{Dress, KEEPS_MASKS, Look, LookChoices};
@@ -67,9 +69,7 @@ pub(crate) use self::making::{Instruments, Running, evolve, finish};
 pub(crate) use self::memory::{drawing_bytes, estimate_bytes};
 pub(crate) use self::preset::Preset;
 pub(crate) use self::presets::{PaperPreset, Shaders};
-pub(crate) use self::provenance::{
-    KEYWORD, Provenance, Provenances, SOFTWARE, Told, picture_metadata, population_sha256, without_header,
-};
+pub(crate) use self::provenance::{KEYWORD, Provenance, Provenances, SOFTWARE, Told, picture_metadata, without_header};
 pub(crate) use self::settings::{SchemeSettings, Settings};
 pub(crate) use self::text_file::{SETTINGS_BYTES_MAX, read_text, text_of, toml_mistake};
 pub(crate) use self::words::{backdrop, color, color_count, grout_color};

@@ -88,9 +88,6 @@ pub(crate) struct BatchArgs {
     /// What to do about outputs that are there already
     #[arg(long, value_enum, value_name = "WHAT", default_value = "skip-same", help_heading = "Output")]
     pub on_exists: OnExists,
-    /// Make everything anew: --on-exists overwrite
-    #[arg(long, conflicts_with = "on_exists", help_heading = "Output")]
-    pub force: bool,
     /// Where a line of JSON is added for every picture [default: results.jsonl in the output folder, or
     /// results.K-of-N.jsonl of a shard]
     #[arg(long, value_name = "FILE", help_heading = "Output")]
@@ -126,13 +123,6 @@ pub(crate) struct BatchArgs {
 
     #[command(flatten)]
     pub messages: MessageArgs,
-}
-
-impl BatchArgs {
-    /// What to do about outputs that are there already.
-    pub(crate) fn on_exists(&self) -> OnExists {
-        if self.force { OnExists::Overwrite } else { self.on_exists }
-    }
 }
 
 #[cfg(test)]

@@ -59,7 +59,8 @@ fn merged(population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<u
 }
 
 fn encoded(population: &Population, canvas: &Canvas, supersampling: u32) -> Vec<u8> {
-    let layers = Layers::draw(&mut CpuPainter, population, canvas, supersampling, 8, &mut |_| {}).expect("the twin draws anything");
+    let layers = Layers::draw(&mut CpuPainter, population, canvas, supersampling, 8, &mut |_| {})
+        .expect("the twin draws anything");
     openraster::encode(&layers, &merged(population, canvas, supersampling)).unwrap()
 }
 

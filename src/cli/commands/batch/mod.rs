@@ -95,7 +95,7 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
         terminal::say(&format!("smalti: {} of {all} pictures are in this shard", items.len()));
     }
     if verbosity > Verbosity::Quiet {
-        say_existing(args.on_exists(), &items);
+        say_existing(args.on_exists, &items);
     }
     computing.start_threads()?;
     let begin = |path: &PathBuf| {
@@ -112,7 +112,7 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
         items: &items,
         workers: &workers,
         io_threads: threads::io_threads(args.io_threads, computing.thread_count(), items.len()),
-        on_exists: args.on_exists(),
+        on_exists: args.on_exists,
         earlier: &earlier,
         shard,
         schedule: &Schedule::new(&items),

@@ -9,7 +9,7 @@ use crate::cli::values::table_cell;
 use crate::error::{Error, Result};
 
 /// The fields of a row, in order.
-const COLUMNS: [&str; 27] = [
+const COLUMNS: [&str; 28] = [
     "id",
     "input",
     "status",
@@ -32,6 +32,7 @@ const COLUMNS: [&str; 27] = [
     "load_ms",
     "evolve_ms",
     "save_ms",
+    "ended_at",
     "device",
     "shard",
     "host",
