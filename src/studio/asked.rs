@@ -26,6 +26,9 @@ use crate::shapes::Shader;
 /// What stands for the bytes of a file whose name decides nothing.
 const HASH: &str = "sha256:";
 
+/// The parameter that a finished mosaic may change.
+pub(super) const OUTPUT_SIZE: &str = "output-size";
+
 /// Parameters with their values.
 type Told = Map<String, Value>;
 
@@ -58,7 +61,7 @@ pub(super) fn asked(settings: &Settings, job: &Job, resized_px: Option<u32>) -> 
         }),
     );
     tell(&mut told, "time", settings.time_limit.map(|limit| format!("{}ms", limit.as_millis())));
-    tell(&mut told, "output-size", resized_px);
+    tell(&mut told, OUTPUT_SIZE, resized_px);
     tell(&mut told, "seed", Some(job.scheme.seed()));
     match &job.scheme {
         SchemeSettings::Cells(cells) => told.extend(of_cells(settings, job, cells)),

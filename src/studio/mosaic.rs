@@ -1,7 +1,5 @@
 //! A finished mosaic: its tiles, its score, its pixels at any size, and its bytes in every format.
 
-use serde_json::json;
-
 use super::device::Device;
 use super::drawing::{Content, Drawn, JPEG_QUALITY, Pieces, Raster, View};
 use super::job::Job;
@@ -149,8 +147,7 @@ impl Mosaic {
         let view = View::new(width_px, height_px, resized_px);
         let mut drawn = Drawn { population, marginal, view, picture: None, layers: None };
         drawn.draw(&mut *device.open_painter()?, Pieces { picture: true, layers: false })?;
-        let told = [("output_size_px".to_owned(), json!(resized_px))];
-        let picture_provenance = self.picture_provenance.with(told.into_iter().collect());
+        let picture_provenance = self.picture_provenance.resized(resized_px);
         Ok(Self { drawn, picture_provenance, ..self.clone() })
     }
 

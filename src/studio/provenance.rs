@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
-use super::asked::asked;
+use super::asked::{OUTPUT_SIZE, asked};
 use super::cells::{CellsSettings, MaskLayers};
 use super::hashes::{masks_sha256, population_sha256};
 use super::hex::hexadecimal;
@@ -144,6 +144,19 @@ impl Provenance {
         let mut decisive = self.decisive.clone();
         decisive.extend(more);
         Self::of(decisive)
+    }
+
+    /// The provenance of the same mosaic drawn with a longer side of `resized_px`, or as it evolved.
+    pub(super) fn resized(&self, resized_px: Option<u32>) -> Self {
+        let mut recipe = self.decisive("recipe").as_object().cloned().unwrap_or_default();
+        match resized_px {
+            Some(px) => recipe.insert(OUTPUT_SIZE.to_owned(), px.into()),
+            None => recipe.remove(OUTPUT_SIZE),
+        };
+        self.with(Map::from_iter([
+            ("output_size_px".to_owned(), json!(resized_px)),
+            ("recipe".to_owned(), Value::Object(recipe)),
+        ]))
     }
 
     /// Something that decides the result.

@@ -6,6 +6,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
+use serde_json::Value;
+
 use crate::batch::{ALL_FORMATS, batch, done, paint, rows, statuses, tree};
 use crate::cli_interrupts::send;
 use crate::workshop::Workshop;
@@ -13,6 +15,44 @@ use crate::workshop::Workshop;
 /// Whether a name is that of a temporary file.
 fn is_partial(name: &str) -> bool {
     name.contains(".smalti-")
+}
+
+#[test]
+fn what_is_up_to_date_keeps_its_figures_and_what_is_replaced_is_counted() {
+    let workshop = Workshop::new();
+    std::fs::create_dir(workshop.path("in")).unwrap();
+    workshop.paint("in/a.png", 40, 30);
+    workshop.paint("in/b.png", 30, 30);
+    let run = |flags: &str| {
+        let ran = workshop.run(&format!("batch in -o out -n 60 --evals 2k {flags}"));
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        ran.stderr
+    };
+    assert!(!run("").contains("there already"));
+    assert!(run("").contains("2 of 2 outputs are there already: those of the same options stay"));
+    let rows: Vec<Value> = String::from_utf8(workshop.read("out/results.jsonl"))
+        .unwrap()
+        .lines()
+        .map(|line| line.parse().unwrap())
+        .collect();
+    for id in ["a", "b"] {
+        let [first, again]: [&Value; 2] =
+            rows.iter().filter(|row| row["id"] == id).collect::<Vec<_>>().try_into().unwrap();
+        assert_eq!((&first["status"], &again["status"]), (&"complete".into(), &"unchanged".into()));
+        for figure in ["psnr", "spread", "living", "sae", "evals", "evolve_ms", "device", "key"] {
+            assert!(first[figure] == again[figure] && !first[figure].is_null(), "{figure}: {first} {again}");
+        }
+        assert!(first["ended_at"].as_str() < again["ended_at"].as_str(), "{first} {again}");
+    }
+    assert!(!run("").contains("replaced "), "nothing is replaced");
+    std::fs::remove_file(workshop.path("out/b.png")).unwrap();
+    let told = run("--seed 1");
+    assert!(told.contains("1 of 2 outputs are there already"), "{told}");
+    let replaced: Vec<&str> = told.lines().filter(|line| line.starts_with("replaced ")).collect();
+    assert_eq!(
+        replaced.iter().map(|line| line.split_whitespace().collect()).collect::<Vec<Vec<_>>>(),
+        [["replaced", "1"]]
+    );
 }
 
 #[test]
@@ -224,7 +264,7 @@ fn a_torn_last_line_of_the_results_stays_alone() {
     let text = String::from_utf8(workshop.read("out/results.jsonl")).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines.len(), 2);
-    let row: serde_json::Value = serde_json::from_str(lines[1]).unwrap();
+    let row: Value = serde_json::from_str(lines[1]).unwrap();
     assert_eq!(row["status"], "complete");
 }
 

@@ -155,7 +155,7 @@ fn a_shader_shades_the_masks_that_are_named_and_the_rectangles_of_the_first_run_
 fn a_dry_run_and_the_summary_say_what_was_asked_for() {
     let workshop = Workshop::new();
     let flags = "--mask disc --shader soft --opacity 0.5 --colors 9 --color-mode mean --p-crossover 0.25 -o x.png";
-    for ran in [workshop.evolve(&format!("{flags} --dry-run")), workshop.evolve(flags)] {
+    for ran in [workshop.evolve(&format!("{flags} --dry-run")), workshop.evolve(&format!("{flags} -v"))] {
         for told in ["disc, shader soft, translucent, opacity 0.50", "9 colours", "colours by mean", "crossover 0.25"] {
             assert!(ran.stderr.contains(told), "{told}: {}", ran.stderr);
         }

@@ -272,3 +272,21 @@ fn without_a_reference_or_any_picture_nothing_is_scored() {
     }
     assert_eq!(scores(&workshop, "photo.png low.png missing.png", 2).0.len(), 0);
 }
+
+#[test]
+fn a_photo_is_reduced_to_the_mosaic_as_evolve_reduces_it() {
+    let workshop = Workshop::new();
+    workshop.paint("large.png", 90, 67);
+    let ran = workshop.run("evolve large.png -o m.png -o s.png --size 40 -n 60 --evals 2k --save-target target.png");
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let against = |line: &str| {
+        let ran = workshop.run(&format!("score {line} --json"));
+        assert_eq!(ran.code, Some(0), "{line}: {}", ran.stderr);
+        ran.stdout
+    };
+    assert_eq!(against("large.png m.png s.png --fit"), against("target.png m.png s.png"));
+    let ran = workshop.run("score large.png m.png");
+    assert!(ran.code == Some(2) && ran.stderr.contains("--fit reduces"), "{}", ran.stderr);
+    let ran = workshop.run("score m.png large.png --fit");
+    assert!(ran.code == Some(2) && ran.stderr.contains("does not enlarge"), "{}", ran.stderr);
+}

@@ -108,6 +108,21 @@ fn auto_takes_the_shard_from_the_scheduler_and_without_one_refuses() {
 }
 
 #[test]
+fn a_merge_takes_the_newest_row_and_tells_of_rows_whose_files_hold_something_else() {
+    let workshop = workshop();
+    // The name of the older run sorts after that of the newer one.
+    run(&workshop, 0, &format!("batch in/p1.png in/p2.png -o out --results out/results.z.jsonl {FLAGS}"));
+    run(&workshop, 0, &format!("batch in/p1.png in/p2.png -o out --results out/results.a.jsonl {FLAGS} --seed 5"));
+    let ran = run(&workshop, 0, "merge out -o merged.jsonl");
+    assert!(!ran.stderr.contains("another result"), "{}", ran.stderr);
+    assert!(rows(&workshop, "merged.jsonl").iter().all(|row| row["seed"] == 5));
+    run(&workshop, 0, &format!("evolve in/p2.png -o out/p2.png --force {FLAGS} --seed 6"));
+    let ran = run(&workshop, 0, "merge out -o merged.jsonl");
+    let told: Vec<&str> = ran.stderr.lines().filter(|line| line.contains("another result")).collect();
+    assert_eq!(told, ["smalti: p2: its row tells of another result than out/p2.png holds; run the batch again"]);
+}
+
+#[test]
 fn a_merge_tells_what_is_missing_and_replaces_no_file_that_is_not_its_own() {
     let workshop = workshop();
     let row = r#"{"id":"in/p1","status":"complete","output":["out/in/p1.png"]}"#;

@@ -270,7 +270,7 @@ fn render_population(options: &RenderOptions, row: &mut RenderRow) -> Result<()>
 /// change is part of its key.
 fn adapted(mut population: Population, options: &RenderOptions) -> Result<(Population, Map<String, Value>)> {
     let mut asked = Map::new();
-    if let Some(background) = options.background {
+    if let Some(background) = options.background.filter(|background| *background != population.background) {
         population.background = background;
         let color = match background {
             Backdrop::Color(color) => hexadecimal(&color),

@@ -18,9 +18,10 @@ pub(super) fn print_summary(row: &Row, options: &PictureOptions, job: &Job) {
     let ended = if is_as_planned(stop) { String::new() } else { format!(", ended {}", words::why_ended(stop)) };
     let written = if row.output.is_empty() { "nothing".to_owned() } else { row.output.join(", ") };
     let seconds = row.evolve_ms / 1e3;
-    terminal::say(&format!("wrote {written}: {tiles}, {likeness}, {seconds:.1} s{ended}{}", warming_up(row)));
+    let partial = if row.status == Status::Partial { " (partial)" } else { "" };
+    terminal::say(&format!("wrote {written}{partial}: {tiles}, {likeness}, {seconds:.1} s{ended}{}", warming_up(row)));
     if row.status == Status::Partial {
-        terminal::say("the mosaic is not finished: the same command starts over, and --init goes on from a .npz");
+        terminal::say("the same command starts over, and --init goes on from a .npz");
     }
 }
 

@@ -155,7 +155,7 @@ mod tests {
         let csv = String::from_utf8(csv(&[row(line, "r.jsonl")]).expect("rows are CSV")).expect("and text");
         let lines: Vec<&str> = csv.lines().collect();
         assert_eq!(lines[0], COLUMNS.join(","));
-        assert_eq!(lines[1], r#""a, b",,complete,,x.png;x.npz,,,,,,34.5,,,,,,,,,,,,,,,,"no ""x""""#);
+        assert_eq!(lines[1], r#""a, b",,complete,,x.png;x.npz,,,,,,34.5,,,,,,,,,,,,,,,,,"no ""x""""#);
     }
 
     #[test]
