@@ -1,3 +1,5 @@
+//! libFuzzer on files of flags; without it, files once more.
+
 #![cfg_attr(fuzzing, no_main)]
 
 #[cfg(fuzzing)]

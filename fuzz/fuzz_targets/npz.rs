@@ -1,3 +1,5 @@
+//! libFuzzer on populations; without it, files once more.
+
 #![cfg_attr(fuzzing, no_main)]
 
 #[cfg(fuzzing)]

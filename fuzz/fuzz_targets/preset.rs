@@ -1,3 +1,5 @@
+//! libFuzzer on presets; without it, files once more.
+
 #![cfg_attr(fuzzing, no_main)]
 
 #[cfg(fuzzing)]

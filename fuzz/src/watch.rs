@@ -4,10 +4,16 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+/// On a busy machine an input may wait long for a processor. So one hangs if it has worked for as long as is allowed, or
+/// has waited for so many times as long.
+const PATIENCE: u32 = 20;
+
 /// The input at work.
 #[derive(Default)]
 struct Now {
     since: Option<Instant>,
+    /// What the process had worked before.
+    worked: Duration,
     /// Where its bytes lie.
     path: PathBuf,
     /// Where in the sources the last panic was, and what it said.
@@ -27,7 +33,9 @@ impl Watch {
             loop {
                 std::thread::sleep(Duration::from_millis(100));
                 let now = of_thread.now();
-                if now.since.is_some_and(|since| since.elapsed() > longest) {
+                let Some(took) = now.since.map(|since| since.elapsed()) else { continue };
+                let has_worked = worked().is_none_or(|worked| worked.saturating_sub(now.worked) > longest);
+                if took > longest && (has_worked || took > longest * PATIENCE) {
                     hung(&now.path);
                 }
             }
@@ -50,7 +58,7 @@ impl Watch {
 
     /// An input is at work now.
     pub fn start(&self, path: PathBuf) {
-        *self.now() = Now { since: Some(Instant::now()), path, panic: None };
+        *self.now() = Now { since: Some(Instant::now()), worked: worked().unwrap_or_default(), path, panic: None };
     }
 
     /// It is done: how long it took, and the panic of any thread, though somebody may have caught it.
@@ -58,4 +66,13 @@ impl Watch {
         let mut now = self.now();
         (now.since.take().map_or(Duration::ZERO, |since| since.elapsed()), now.panic.take())
     }
+}
+
+/// How long all threads of this process together have worked, where the system tells it.
+fn worked() -> Option<Duration> {
+    // Fields 14 and 15, in hundredths of a second (proc_pid_stat(5)); the second field ends with the last bracket.
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let (_, fields) = stat.rsplit_once(')')?;
+    let ticks = fields.split_whitespace().skip(11).take(2).map(|field| field.parse::<u64>().ok());
+    Some(Duration::from_millis(10 * ticks.sum::<Option<u64>>()?))
 }
