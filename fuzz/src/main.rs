@@ -61,9 +61,10 @@ fn drive(options: Options) -> Result<usize, String> {
     let mut tallies: Vec<Tally> = options.targets.iter().map(|_| Tally::default()).collect();
     let is_over = |options: &Options| options.time.is_some_and(|time| begun.elapsed() >= time);
     let mut driver = Driver { options, watch: Watch::begin(LONGEST, hung), faults: HashSet::new() };
-    let mut first = 0;
-    while first < driver.options.inputs && !is_over(&driver.options) {
-        let end = driver.options.inputs.min(first + ROUND);
+    let mut first = driver.options.first;
+    let last = first.saturating_add(driver.options.inputs);
+    while first < last && !is_over(&driver.options) {
+        let end = last.min(first + ROUND);
         for (place, corpus) in corpora.iter().enumerate() {
             let target = driver.options.targets[place];
             for index in first..end {
@@ -128,9 +129,9 @@ fn tell(driver: &Driver, tallies: &[Tally], took: Duration) {
         let percent = 100 * tally.accepted / tally.inputs.max(1);
         let Tally { inputs, longest, longest_index, .. } = tally;
         println!(
-            "{:<10}{inputs:>8} inputs, {percent:>3} % accepted, at most {:>6.1} ms (input {longest_index})",
+            "{:<10}{inputs:>8} inputs, {percent:>3} % accepted, at most {:>5} ms (input {longest_index})",
             target.name,
-            1e3 * longest.as_secs_f64()
+            longest.as_millis()
         );
     }
     let inputs: u64 = tallies.iter().map(|tally| tally.inputs).sum();

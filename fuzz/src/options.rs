@@ -5,11 +5,14 @@ use std::time::Duration;
 
 use smalti_fuzz::targets::{TARGETS, Target};
 
-pub const USAGE: &str = "smalti-fuzz [--inputs N] [--minutes N] [--seed N] [--target NAME].. [--kept FOLDER]";
+pub const USAGE: &str =
+    "smalti-fuzz [--inputs N] [--first N] [--minutes N] [--seed N] [--target NAME].. [--kept FOLDER]";
 /// Inputs of a target, if nothing else is asked for.
 const INPUTS: u64 = 500;
 
 pub struct Options {
+    /// The first input of each target; it and the seed decide the input.
+    pub first: u64,
     /// Inputs of each target, unless the time is up before.
     pub inputs: u64,
     pub time: Option<Duration>,
@@ -21,13 +24,14 @@ pub struct Options {
 
 impl Options {
     pub fn parse(mut words: impl Iterator<Item = String>) -> Result<Self, String> {
-        let (mut inputs, mut minutes, mut seed, mut targets) = (None, None, 1, Vec::new());
+        let (mut first, mut inputs, mut minutes, mut seed, mut targets) = (0, None, None, 1, Vec::new());
         let mut kept = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/artifacts"));
         while let Some(word) = words.next() {
             let value = words.next().ok_or_else(|| format!("{word} needs a value; {USAGE}"))?;
             let number = || value.parse::<u64>().map_err(|_| format!("{word} {value} is no whole number; {USAGE}"));
             match word.as_str() {
                 "--inputs" => inputs = Some(number()?),
+                "--first" => first = number()?,
                 "--minutes" => minutes = Some(number()?),
                 "--seed" => seed = number()?,
                 "--kept" => kept = PathBuf::from(value),
@@ -44,6 +48,6 @@ impl Options {
         }
         let time = minutes.map(|minutes| Duration::from_secs(60 * minutes));
         let inputs = inputs.unwrap_or(if time.is_some() { u64::MAX } else { INPUTS });
-        Ok(Self { inputs, time, seed, targets, kept })
+        Ok(Self { first, inputs, time, seed, targets, kept })
     }
 }

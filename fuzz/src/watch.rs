@@ -61,10 +61,13 @@ impl Watch {
         *self.now() = Now { since: Some(Instant::now()), worked: worked().unwrap_or_default(), path, panic: None };
     }
 
-    /// It is done: how long it took, and the panic of any thread, though somebody may have caught it.
+    /// It is done: how long it has worked, and the panic of any thread, though somebody may have caught it. Where the
+    /// system does not tell what was work, waiting for a processor counts, too.
     pub fn stop(&self) -> (Duration, Option<String>) {
         let mut now = self.now();
-        (now.since.take().map_or(Duration::ZERO, |since| since.elapsed()), now.panic.take())
+        let took = now.since.take().map_or(Duration::ZERO, |since| since.elapsed());
+        let has_worked = worked().map_or(took, |worked| worked.saturating_sub(now.worked));
+        (has_worked, now.panic.take())
     }
 }
 
