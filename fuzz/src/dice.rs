@@ -11,12 +11,12 @@ impl Dice {
         let hash = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3);
         let named = name.bytes().chain(seed.to_le_bytes()).fold(0xCBF2_9CE4_8422_2325, hash);
         let mut dice = Self(named ^ index.wrapping_mul(0xD134_2543_DE82_EF95));
-        dice.next();
+        dice.number();
         dice
     }
 
     /// Any number.
-    pub fn next(&mut self) -> u64 {
+    pub fn number(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
         let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -25,7 +25,7 @@ impl Dice {
 
     /// A number below `limit`, and 0 if that is 0.
     pub fn below(&mut self, limit: usize) -> usize {
-        (self.next() % (limit.max(1) as u64)) as usize
+        (self.number() % (limit.max(1) as u64)) as usize
     }
 
     /// A range within `length`, rarely a long one.

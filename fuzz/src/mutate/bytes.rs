@@ -37,7 +37,7 @@ pub fn change(bytes: &mut Vec<u8>, other: &[u8], dice: &mut Dice) {
     let place = dice.below(bytes.len());
     match dice.below(12) {
         0 | 1 => bytes[place] ^= 1 << dice.below(8),
-        2 => bytes[place] = dice.next() as u8,
+        2 => bytes[place] = dice.number() as u8,
         3 => bytes[place] = *dice.pick(&[0, 1, 0x7F, 0x80, 0xFE, 0xFF]),
         4 => overwrite(bytes, place, *dice.pick(&TELLING), dice),
         5 => nudge(bytes, place, dice),
@@ -65,7 +65,7 @@ pub fn change(bytes: &mut Vec<u8>, other: &[u8], dice: &mut Dice) {
         }
         _ => {
             let end = bytes.len().min(place + 1 + dice.below(8));
-            bytes[place..end].iter_mut().for_each(|byte| *byte = dice.next() as u8);
+            bytes[place..end].iter_mut().for_each(|byte| *byte = dice.number() as u8);
         }
     }
 }

@@ -17,7 +17,7 @@ pub fn mutated(file: &[u8], other: &[u8], words: &[Vec<u8>], dice: &mut Dice) ->
     let mut damaged = file.to_vec();
     let is_text = !file.is_empty() && !file.contains(&0) && std::str::from_utf8(file).is_ok();
     // One change as a rule: what comes after a second mistake is seldom read.
-    for _ in 0..=(dice.next().trailing_zeros()) {
+    for _ in 0..=(dice.number().trailing_zeros()) {
         if is_text {
             text::change(&mut damaged, other, words, dice);
         } else if png::is_png(&damaged) && !dice.one_in(4) {

@@ -52,7 +52,7 @@ pub fn change(png: &mut Vec<u8>, other: &[u8], dice: &mut Dice) {
         }
         5 => {
             let mut body = Vec::new();
-            (0..dice.below(40)).for_each(|_| body.push(dice.next() as u8));
+            (0..dice.below(40)).for_each(|_| body.push(dice.number() as u8));
             chunks.insert(place, Chunk { kind: **dice.pick(&KINDS), body });
         }
         6 | 7 => change_header(&mut chunks, dice),
