@@ -1,5 +1,6 @@
 //! The whole command line: all commands, with their help. What flags mean is decided where they are defined.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -20,9 +21,10 @@ use crate::cli::commands::score::ScoreArgs;
 use crate::cli::commands::show::ShowArgs;
 use crate::cli::commands::timelapse::TimelapseArgs;
 use crate::cli::commands::video::VideoArgs;
-use crate::cli::list::BatchArgs;
+use crate::cli::list::{self, BatchArgs};
 use crate::cli::terminal::{self, advice, interrupt};
 use crate::cli::{commands, config};
+use crate::error::Result;
 
 /// Evolves pictures into mosaics of thousands of tiles.
 #[derive(Debug, Parser)]
@@ -51,17 +53,11 @@ impl Cli {
     /// # Errors
     /// The exit code to end with: 0 after help or version, 2 after a wrong command line.
     pub fn from_command_line() -> Result<Self, ExitCode> {
-        let mut definition = Self::command();
-        definition.build();
-        advice::know_flags(&definition);
-        let tokens = config::expand(std::env::args_os().collect(), &definition).map_err(|error| {
+        let parsed = Self::parsed(std::env::args_os().collect()).map_err(|error| {
             terminal::error(&advice::sentence(&error));
             ExitCode::from(advice::exit_code(&error))
         })?;
-        let matches = Self::command().try_get_matches_from(&tokens);
-        let parsed = matches.and_then(|matches| Self::from_arg_matches(&matches).map(|cli| (cli, matches)));
-        let typed = |matches| Typed { tokens: tokens.clone(), matches, definition: Self::command() };
-        parsed.map(|(cli, matches)| Self { typed: typed(matches), ..cli }).map_err(|error| {
+        parsed.map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
                 terminal::error(&one_sentence(&error.to_string(), &command_typed()));
             } else {
@@ -70,6 +66,40 @@ impl Cli {
             }
             ExitCode::from(if error.use_stderr() { 2 } else { 0 })
         })
+    }
+
+    /// The command line of these tokens, of which the first names the program; nothing is printed.
+    ///
+    /// # Errors
+    /// About the file of `--config`; within, about the tokens.
+    fn parsed(typed: Vec<OsString>) -> Result<Result<Self, clap::Error>> {
+        let mut definition = Self::command();
+        definition.build();
+        advice::know_flags(&definition);
+        let tokens = config::expand(typed, &definition)?;
+        let parse = || {
+            let matches = Self::command().try_get_matches_from(&tokens)?;
+            let cli = Self::from_arg_matches(&matches)?;
+            Ok(Self { typed: Typed { tokens: tokens.clone(), matches, definition: Self::command() }, ..cli })
+        };
+        Ok(parse())
+    }
+
+    /// Checks the command line of these tokens as far as is possible before the first picture is read, and does
+    /// nothing: for the fuzz targets of files of flags and manifests. How many pictures it names, if it is a batch.
+    ///
+    /// # Errors
+    /// The sentence that the user would see.
+    #[doc(hidden)]
+    pub fn checked(typed: Vec<OsString>) -> Result<usize, String> {
+        let cli = Self::parsed(typed)
+            .map_err(|error| advice::sentence(&error))?
+            .map_err(|error| one_sentence(&error.to_string(), "smalti"))?;
+        match &cli.command {
+            Command::Batch(args) => list::find(args, &cli.typed).map(|items| items.len()),
+            _ => Ok(0),
+        }
+        .map_err(|error| advice::sentence(&error))
     }
 }
 

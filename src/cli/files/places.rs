@@ -12,7 +12,10 @@ static FLAGS_READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Remembers that a file of flags was read, so that no command writes to it.
 pub(crate) fn note_flags_read(path: &Path) {
-    FLAGS_READ.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
+    let mut known = FLAGS_READ.lock().unwrap_or_else(PoisonError::into_inner);
+    if !known.iter().any(|known| known == path) {
+        known.push(path.to_owned());
+    }
 }
 
 /// The files that a command reads.
