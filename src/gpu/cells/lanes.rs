@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::buffers::{self, LaneSlices, POOLS, Part, SearchBuffers};
 use super::lane::Lane;
 use super::layout::{CellRecord, FlyRecord, SearchHeader};
+use super::mark::{self, Mark};
 use super::pass::{CellsPass, LaneSize, OldDepths, Team, Variant};
 use super::plan::{PIXEL_WORDS, Plan};
 use super::shape::CellShape;
@@ -24,6 +25,9 @@ use crate::vk::{Device, DeviceKind, PassTime, ReadTicket, Recorder, Timing};
 /// Most iterations of a submission, which keep it well below a watchdog's second. Software Vulkan has no watchdog, but
 /// runs the lanes of a dispatch one after the other; there all lanes share this number.
 const ITERATIONS_MAX: u32 = 16;
+/// Most cells that a submission to software Vulkan takes as far as their budget allows: tenths of a second of work.
+/// An iteration of more of them takes several submissions.
+const CELLS_MAX: u32 = 64;
 
 /// Searches on a Vulkan device that share its dispatches. Their sizes, numbers of flies and rules may differ.
 ///
@@ -38,6 +42,8 @@ pub struct VulkanLanes {
     lanes: Vec<Option<Lane>>,
     /// Whether the rules on the device and the stages of the pass are those of the lanes.
     is_arranged: bool,
+    /// Of an iteration that takes several submissions, the first cell of the next one; 0 between iterations.
+    next_cell: u32,
 }
 
 /// The lanes of one variant. They share buffers that no other lanes use, so that dispatches of different kins need no
@@ -63,6 +69,7 @@ impl VulkanLanes {
             kins: Vec::new(),
             lanes: Vec::new(),
             is_arranged: false,
+            next_cell: 0,
         })
     }
 
@@ -162,6 +169,7 @@ impl VulkanLanes {
         (lane.standing, lane.objective) = (standing, standing.objective);
         (lane.wanted, lane.iterations, lane.has_old_depths) = (0, 0, false);
         (lane.has_failed, lane.failure) = (false, None);
+        lane.has_old_pixels = false;
         Ok(())
     }
 
@@ -238,7 +246,36 @@ impl VulkanLanes {
             teams.push(Team { variant, group: kin.buffers.bind(self.pass.any_pipeline())?, lanes: team });
         }
         self.pass.arrange(&teams)?;
-        self.is_arranged = true;
+        (self.is_arranged, self.next_cell) = (true, 0);
+        Ok(())
+    }
+
+    /// The ranges of what marks copy.
+    fn marked_ranges(&self, number: usize) -> [BufferRange; 4] {
+        mark::PARTS.map(|part| self.range(number, part))
+    }
+
+    /// The search of a lane on the CPU. It lays the flies of the lane on its pixels, which they alone decide.
+    fn twin(&mut self, number: usize) -> Result<(CpuSearch, Vec<Fly>)> {
+        let records = self.read_fly_records(&[number])?;
+        let flies: Vec<Fly> = records.iter().flatten().map(FlyRecord::fly).collect();
+        let mut twin = CpuSearch::new(self.lane(number).course.clone());
+        twin.load(&flies)?;
+        if twin.read_back()?.flies != flies {
+            return Err(Error::Internal(format!("the flies of lane {number} cannot be laid again")));
+        }
+        Ok((twin, flies))
+    }
+
+    /// Lays the pixels of a lane that was taken back.
+    fn lay_again(&mut self, number: usize) -> Result<()> {
+        let (mut twin, flies) = self.twin(number)?;
+        let Lane { course, plan, .. } = self.lane(number);
+        let (pixels, stacks) = state::state_words(course, plan, &flies, &twin.read_back_stacks()?);
+        self.write(number, Part::Pixels, bytemuck::cast_slice(&pixels))?;
+        self.write(number, Part::Stacks, bytemuck::cast_slice(&stacks))?;
+        let lane = self.lane_mut(number);
+        (lane.has_old_pixels, lane.has_old_depths) = (false, false);
         Ok(())
     }
 
@@ -250,7 +287,10 @@ impl VulkanLanes {
             lane.iterations.div_ceil(lane.standing.rounds.max(1)).max(1).saturating_mul(left)
         };
         let most = match self.device.info().kind {
-            DeviceKind::Cpu => (ITERATIONS_MAX / busy.len().max(1) as u32).max(1),
+            DeviceKind::Cpu => {
+                let cells: u32 = busy.iter().map(|&number| self.lane(number).plan.cell_count).sum();
+                (ITERATIONS_MAX / busy.len().max(1) as u32).min(CELLS_MAX / cells.max(1)).max(1)
+            }
             _ => ITERATIONS_MAX,
         };
         busy.iter().map(|&number| needed(self.lane(number))).min().unwrap_or(1).clamp(1, most)
@@ -273,6 +313,19 @@ impl VulkanLanes {
             }
         }
         self.pass.record_depths(&mut self.recorder, &with_old_depths)?;
+        for &number in busy {
+            let ranges = self.marked_ranges(number);
+            if let Some(mark) = self.lanes[number].as_mut().and_then(|lane| lane.mark.as_mut()).filter(|mark| mark.is_due) {
+                mark.record_keep(&mut self.recorder, &ranges)?;
+            }
+        }
+        let (cells, lanes) = self.pass.cells();
+        if self.device.info().kind == DeviceKind::Cpu && cells * lanes > CELLS_MAX {
+            let first = self.next_cell;
+            let end = (first + (CELLS_MAX / lanes).max(1)).min(cells);
+            self.next_cell = if end == cells { 0 } else { end };
+            return self.pass.record_part(&mut self.recorder, first..end);
+        }
         let iterations = self.iterations(busy);
         self.pass.record(&mut self.recorder, iterations)
     }
@@ -318,7 +371,43 @@ impl SearchLanes for VulkanLanes {
         self.begin(lane, Some(flies))
     }
 
+    fn mark(&mut self, number: usize) -> Result<()> {
+        let ranges = self.marked_ranges(number);
+        let device = Arc::clone(&self.device);
+        let Lane { mark, standing, iterations, .. } = self.lane_mut(number);
+        let mark = match mark {
+            Some(mark) => mark,
+            None => mark.insert(Mark::create(&device, &ranges)?),
+        };
+        (mark.standing, mark.iterations, mark.is_due) = (*standing, *iterations, true);
+        Ok(())
+    }
+
+    fn cut(&mut self, number: usize) -> Result<()> {
+        let ranges = self.marked_ranges(number);
+        let lane = self.lane_mut(number);
+        let Some(mark) = lane.mark.as_ref() else {
+            return Err(Error::Internal(format!("lane {number} is cut and was never marked")));
+        };
+        (lane.standing, lane.iterations, lane.wanted) = (mark.standing, mark.iterations, mark.standing.rounds);
+        let header = lane.header();
+        self.write(number, Part::Header, bytemuck::bytes_of(&header))?;
+        let Lane { mark, has_old_pixels, .. } = self.lanes[number].as_mut().unwrap_or_else(|| no_lane(number));
+        if let Some(mark) = mark.as_ref().filter(|mark| !mark.is_due) {
+            *has_old_pixels = true;
+            mark.record_restore(&mut self.recorder, &ranges)?;
+        }
+        self.recorder.submit_and_wait()
+    }
+
+    fn rounds_between_marks(&self) -> u32 {
+        if self.device.info().kind == DeviceKind::Cpu { 1 } else { u32::MAX }
+    }
+
     fn ask(&mut self, lane: usize, rounds: u32) -> Result<()> {
+        if self.lane(lane).has_old_pixels {
+            self.lay_again(lane)?;
+        }
         let Lane { wanted, has_failed, .. } = self.lane_mut(lane);
         if *has_failed {
             return Err(Error::Internal(format!("lane {lane} failed before and is asked for more")));
@@ -348,6 +437,9 @@ impl SearchLanes for VulkanLanes {
         for (number, ticket) in busy.into_iter().zip(tickets) {
             let header = self.take::<SearchHeader>(&ticket)?[0];
             self.lane_mut(number).absorb(&header);
+        }
+        if !self.lanes.iter().flatten().any(Lane::is_busy) {
+            self.next_cell = 0;
         }
         Ok(())
     }
@@ -384,6 +476,9 @@ impl SearchLanes for VulkanLanes {
     }
 
     fn read_back_stacks(&mut self, lane: usize) -> Result<Stacks> {
+        if self.lane(lane).has_old_pixels {
+            return self.twin(lane)?.0.read_back_stacks();
+        }
         let (pixels, stacks) = (self.ask_for(lane, Part::Pixels)?, self.ask_for(lane, Part::Stacks)?);
         self.recorder.submit_and_wait()?;
         let (pixels, words): (Vec<u32>, Vec<u32>) = (self.take(&pixels)?, self.take(&stacks)?);
