@@ -10,7 +10,8 @@ use super::commands::record_barrier;
 use super::recorder::Recorder;
 use super::scope::Scope;
 use super::{
-    BindingGroup, Buffer, ComputePipeline, DepthTest, DeviceKind, GraphicsPipeline, Image, ImageFormat, PipelineLayout, refused,
+    BindingGroup, Buffer, ComputePipeline, DepthTest, DeviceKind, GraphicsPipeline, Image, ImageFormat, PipelineLayout,
+    refused,
 };
 use crate::error::Result;
 

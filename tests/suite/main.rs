@@ -60,4 +60,5 @@ mod transparency;
 mod video;
 mod vulkan;
 mod vulkan_failures;
+mod within_a_round;
 mod workshop;

@@ -26,9 +26,9 @@ impl<G: Ground> Cells<G> {
         }
         let flies = &self.flies;
         let is_changed = |member: &Member| member.fly != flies[member.index as usize];
-        let changed = cells.into_par_iter().map(|(number, members)| {
-            (number, members.into_iter().filter(is_changed).collect::<Vec<Member>>())
-        });
+        let changed = cells
+            .into_par_iter()
+            .map(|(number, members)| (number, members.into_iter().filter(is_changed).collect::<Vec<Member>>()));
         self.changed = Some(Changed(changed.filter(|(_, members)| !members.is_empty()).collect()));
     }
 

@@ -213,7 +213,11 @@ impl<G: Ground> Cells<G> {
         parts.enumerate().for_each(|(part, (owners, flies))| {
             if !halt.is_called() {
                 let first = (part * FLIES_AT_ONCE) as u32;
-                owners.iter_mut().zip(flies).zip(first..).for_each(|((owner, fly), index)| *owner = cell_of(index, fly));
+                owners
+                    .iter_mut()
+                    .zip(flies)
+                    .zip(first..)
+                    .for_each(|((owner, fly), index)| *owner = cell_of(index, fly));
             }
         });
         if halt.was_called() {

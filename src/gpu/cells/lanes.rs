@@ -9,7 +9,6 @@ use rayon::prelude::*;
 use super::buffers::{self, LaneSlices, POOLS, Part, SearchBuffers};
 use super::lane::Lane;
 use super::layout::{CellRecord, FlyRecord, SearchHeader};
-use super::mark::{self, Mark};
 use super::pass::{CellsPass, LaneSize, OldDepths, Team, Variant};
 use super::plan::{PIXEL_WORDS, Plan};
 use super::shape::CellShape;
@@ -34,12 +33,12 @@ const CELLS_MAX: u32 = 64;
 /// Memory bounds the number of lanes: no buffer that they share may be larger than shaders can see, and several lanes
 /// together may take half of the device's memory.
 pub struct VulkanLanes {
-    device: Arc<Device>,
-    recorder: Recorder,
+    pub(super) device: Arc<Device>,
+    pub(super) recorder: Recorder,
     pass: CellsPass,
     kins: Vec<Kin>,
     /// By number, without those that are free.
-    lanes: Vec<Option<Lane>>,
+    pub(super) lanes: Vec<Option<Lane>>,
     /// Whether the rules on the device and the stages of the pass are those of the lanes.
     is_arranged: bool,
     /// Of an iteration that takes several submissions, the first cell of the next one; 0 between iterations.
@@ -131,7 +130,7 @@ impl VulkanLanes {
     }
 
     /// Where a lane's slice lies in the buffer of a part.
-    fn range(&self, number: usize, part: Part) -> BufferRange {
+    pub(super) fn range(&self, number: usize, part: Part) -> BufferRange {
         let lane = self.lane(number);
         self.kin(lane.variant).buffers.range(part, &lane.slices)
     }
@@ -142,11 +141,11 @@ impl VulkanLanes {
         self.recorder.pass_times()
     }
 
-    fn lane(&self, lane: usize) -> &Lane {
+    pub(super) fn lane(&self, lane: usize) -> &Lane {
         self.lanes[lane].as_ref().unwrap_or_else(|| no_lane(lane))
     }
 
-    fn lane_mut(&mut self, lane: usize) -> &mut Lane {
+    pub(super) fn lane_mut(&mut self, lane: usize) -> &mut Lane {
         self.lanes[lane].as_mut().unwrap_or_else(|| no_lane(lane))
     }
 
@@ -203,7 +202,7 @@ impl VulkanLanes {
     }
 
     /// Writes the beginning of a lane's slice.
-    fn write(&mut self, number: usize, part: Part, bytes: &[u8]) -> Result<()> {
+    pub(super) fn write(&mut self, number: usize, part: Part, bytes: &[u8]) -> Result<()> {
         let BufferRange { buffer, offset, size_bytes } = self.range(number, part);
         if bytes.len() as u64 > size_bytes {
             return Err(Error::Internal(format!("{} bytes for the {size_bytes} of {part:?} of a lane", bytes.len())));
@@ -250,35 +249,6 @@ impl VulkanLanes {
         Ok(())
     }
 
-    /// The ranges of what marks copy.
-    fn marked_ranges(&self, number: usize) -> [BufferRange; 4] {
-        mark::PARTS.map(|part| self.range(number, part))
-    }
-
-    /// The search of a lane on the CPU. It lays the flies of the lane on its pixels, which they alone decide.
-    fn twin(&mut self, number: usize) -> Result<(CpuSearch, Vec<Fly>)> {
-        let records = self.read_fly_records(&[number])?;
-        let flies: Vec<Fly> = records.iter().flatten().map(FlyRecord::fly).collect();
-        let mut twin = CpuSearch::new(self.lane(number).course.clone());
-        twin.load(&flies)?;
-        if twin.read_back()?.flies != flies {
-            return Err(Error::Internal(format!("the flies of lane {number} cannot be laid again")));
-        }
-        Ok((twin, flies))
-    }
-
-    /// Lays the pixels of a lane that was taken back.
-    fn lay_again(&mut self, number: usize) -> Result<()> {
-        let (mut twin, flies) = self.twin(number)?;
-        let Lane { course, plan, .. } = self.lane(number);
-        let (pixels, stacks) = state::state_words(course, plan, &flies, &twin.read_back_stacks()?);
-        self.write(number, Part::Pixels, bytemuck::cast_slice(&pixels))?;
-        self.write(number, Part::Stacks, bytemuck::cast_slice(&stacks))?;
-        let lane = self.lane_mut(number);
-        (lane.has_old_pixels, lane.has_old_depths) = (false, false);
-        Ok(())
-    }
-
     /// Iterations after which about one of the busy lanes is done.
     fn iterations(&self, busy: &[usize]) -> u32 {
         let needed = |lane: &Lane| {
@@ -313,12 +283,7 @@ impl VulkanLanes {
             }
         }
         self.pass.record_depths(&mut self.recorder, &with_old_depths)?;
-        for &number in busy {
-            let ranges = self.marked_ranges(number);
-            if let Some(mark) = self.lanes[number].as_mut().and_then(|lane| lane.mark.as_mut()).filter(|mark| mark.is_due) {
-                mark.record_keep(&mut self.recorder, &ranges)?;
-            }
-        }
+        self.keep_marks(busy)?;
         let (cells, lanes) = self.pass.cells();
         if self.device.info().kind == DeviceKind::Cpu && cells * lanes > CELLS_MAX {
             let first = self.next_cell;
@@ -330,14 +295,14 @@ impl VulkanLanes {
         self.pass.record(&mut self.recorder, iterations)
     }
 
-    fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
+    pub(super) fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
         let tickets = lanes.iter().map(|&lane| self.ask_for(lane, Part::Flies)).collect::<Result<Vec<_>>>()?;
         self.recorder.submit_and_wait()?;
         tickets.iter().map(|ticket| self.take(ticket)).collect()
     }
 }
 
-fn no_lane(lane: usize) -> ! {
+pub(super) fn no_lane(lane: usize) -> ! {
     panic!("lane {lane} was never admitted, or was dismissed")
 }
 
@@ -371,33 +336,12 @@ impl SearchLanes for VulkanLanes {
         self.begin(lane, Some(flies))
     }
 
-    fn mark(&mut self, number: usize) -> Result<()> {
-        let ranges = self.marked_ranges(number);
-        let device = Arc::clone(&self.device);
-        let Lane { mark, standing, iterations, .. } = self.lane_mut(number);
-        let mark = match mark {
-            Some(mark) => mark,
-            None => mark.insert(Mark::create(&device, &ranges)?),
-        };
-        (mark.standing, mark.iterations, mark.is_due) = (*standing, *iterations, true);
-        Ok(())
+    fn mark(&mut self, lane: usize) -> Result<()> {
+        self.mark_lane(lane)
     }
 
-    fn cut(&mut self, number: usize) -> Result<()> {
-        let ranges = self.marked_ranges(number);
-        let lane = self.lane_mut(number);
-        let Some(mark) = lane.mark.as_ref() else {
-            return Err(Error::Internal(format!("lane {number} is cut and was never marked")));
-        };
-        (lane.standing, lane.iterations, lane.wanted) = (mark.standing, mark.iterations, mark.standing.rounds);
-        let header = lane.header();
-        self.write(number, Part::Header, bytemuck::bytes_of(&header))?;
-        let Lane { mark, has_old_pixels, .. } = self.lanes[number].as_mut().unwrap_or_else(|| no_lane(number));
-        if let Some(mark) = mark.as_ref().filter(|mark| !mark.is_due) {
-            *has_old_pixels = true;
-            mark.record_restore(&mut self.recorder, &ranges)?;
-        }
-        self.recorder.submit_and_wait()
+    fn cut(&mut self, lane: usize) -> Result<()> {
+        self.take_back(lane)
     }
 
     fn rounds_between_marks(&self) -> u32 {

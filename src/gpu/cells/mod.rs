@@ -10,3 +10,4 @@ mod plan;
 pub(super) mod search;
 pub(super) mod shape;
 mod state;
+mod taken_back;

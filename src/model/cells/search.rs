@@ -96,7 +96,9 @@ impl Stacks {
                 return difference(target.pixels()[pixel], compositing.over(ground));
             }
             let weight = target.weights().map_or(1, |weights| u64::from(weights[pixel]));
-            stack.first().map_or_else(|| difference(target.pixels()[pixel], ground), |&(_, error)| error as u64 / weight)
+            stack
+                .first()
+                .map_or_else(|| difference(target.pixels()[pixel], ground), |&(_, error)| error as u64 / weight)
         };
         self.pixels.iter().enumerate().map(error).sum()
     }
