@@ -1,8 +1,12 @@
 //! Drives a search in cells: groups rounds into epochs, and decides when to stop.
 //!
 //! Reasons to stop are checked between epochs, and the number of evals after every round that may reach the limit. So
-//! every device ends after the same round. Nothing here knows a device or a clock; an [`Observer`] may.
+//! every device ends after the same round. Nothing here knows a device or a clock; an [`Observer`] may, and its brake
+//! may cut a round short: then the search ends where an earlier round did, as a budget of so many evals ends it.
 
+use std::sync::OnceLock;
+
+use super::brake::Brake;
 use super::evolution::StopReason;
 use super::objective::{lowers_sae_alone, sae};
 use super::observer::{Observer, Seen};
@@ -12,8 +16,7 @@ use crate::model::cells::{Course, Search, Standing};
 
 /// Most rounds of an epoch. After each epoch, depths are spread evenly again.
 pub const ROUNDS_PER_EPOCH: u32 = 4;
-/// Most evals of an epoch of several rounds. The clock and interrupts are checked between epochs, and must not wait
-/// longer than some tenths of a second.
+/// Most evals of an epoch of several rounds, so that observers see it every some tenths of a second.
 const EVALS_PER_EPOCH: u64 = 250_000;
 /// Default number of evals for each fly: two million for the 5,000 flies of a picture of 512x512 px.
 pub const EVALS_PER_FLY: u64 = 400;
@@ -67,7 +70,14 @@ pub fn run(
 pub fn step(search: &mut dyn Search, drive: &mut Drive, observer: &mut dyn Observer) -> Result<Option<StopReason>> {
     match drive.next(search)? {
         Next::Advance(rounds) => {
-            search.advance(rounds)?;
+            if let Some(reason) = advance(search, rounds, &observer.brake())? {
+                // Where an epoch ended, depths are spread already, and in the first population nobody spreads them.
+                if search.standing().rounds == drive.begun.rounds {
+                    return Ok(Some(reason));
+                }
+                drive.cut_epoch(reason);
+                return Ok(None);
+            }
             if drive.pace == Pace::Rounds
                 && let Some(reason) = observer.after_round(&mut Seen::Search(search))?
             {
@@ -86,6 +96,22 @@ pub fn step(search: &mut dyn Search, drive: &mut Drive, observer: &mut dyn Obser
         }
         Next::Done(reason) => Ok(Some(reason)),
     }
+}
+
+/// Makes some rounds; returns a reason if one of them was cut short.
+fn advance(search: &mut dyn Search, rounds: u32, brake: &Brake) -> Result<Option<StopReason>> {
+    if brake.is_absent() {
+        // A device need not remember where the rounds began.
+        return search.advance(rounds).map(|()| None);
+    }
+    let found = OnceLock::new();
+    let is_over = || {
+        let reason = brake.reason();
+        reason.inspect(|reason| _ = found.set(*reason));
+        reason.is_some()
+    };
+    let is_whole = search.advance_until(rounds, &is_over)?;
+    Ok(if is_whole { None } else { found.get().copied() })
 }
 
 /// How many rounds a search makes in one call.
@@ -118,8 +144,8 @@ pub struct Drive {
     /// Evals and objective when the objective had last fallen by a thousandth.
     mark: Standing,
     idle_epochs: u32,
-    /// Evals when the epoch began.
-    begun_evals: u64,
+    /// Where the epoch began.
+    begun: Standing,
     /// Rounds left of the current epoch, if there is one.
     rounds_left: Option<u32>,
     /// Why an observer ended the search in the middle of an epoch.
@@ -130,7 +156,8 @@ impl Drive {
     /// The drive of a search that is at its beginning.
     #[must_use]
     pub fn new(search: &dyn Search, budget: Budget, pace: Pace) -> Self {
-        Self { budget, pace, mark: search.standing(), idle_epochs: 0, begun_evals: 0, rounds_left: None, cut: None }
+        let (mark, begun) = (search.standing(), Standing::default());
+        Self { budget, pace, mark, idle_epochs: 0, begun, rounds_left: None, cut: None }
     }
 
     /// The next step of the search. The caller must have done the step before.
@@ -138,7 +165,8 @@ impl Drive {
     /// # Errors
     /// If the device fails.
     pub fn next(&mut self, search: &mut dyn Search) -> Result<Next> {
-        let evals = search.standing().evals;
+        let standing = search.standing();
+        let evals = standing.evals;
         match self.rounds_left {
             Some(left) if left == 0 || evals >= self.budget.evals => {
                 self.rounds_left = None;
@@ -150,17 +178,17 @@ impl Drive {
             }
             None => Ok(match spent(search, &self.budget, &mut self.mark)? {
                 Some(reason) => Next::Done(reason),
-                None => Next::Advance(self.begin_epoch(evals, evals_per_round(search.course()))),
+                None => Next::Advance(self.begin_epoch(standing, evals_per_round(search.course()))),
             }),
         }
     }
 
     /// Begins an epoch; returns the number of rounds to make first. Far from the end of the budget these are all.
-    fn begin_epoch(&mut self, evals: u64, evals_per_round: u64) -> u32 {
+    fn begin_epoch(&mut self, begun: Standing, evals_per_round: u64) -> u32 {
         let rounds = (EVALS_PER_EPOCH / evals_per_round.max(1)).clamp(1, u64::from(ROUNDS_PER_EPOCH)) as u32;
-        let is_near_the_end = self.budget.evals.saturating_sub(evals) <= evals_per_round * u64::from(rounds);
+        let is_near_the_end = self.budget.evals.saturating_sub(begun.evals) <= evals_per_round * u64::from(rounds);
         let asked = if self.pace == Pace::Rounds || is_near_the_end { 1 } else { rounds };
-        self.begun_evals = evals;
+        self.begun = begun;
         self.rounds_left = Some(rounds - asked);
         asked
     }
@@ -174,7 +202,7 @@ impl Drive {
 
     /// Ends an epoch whose depths were spread; returns a reason if the search makes no more children.
     pub fn end_epoch(&mut self, standing: Standing) -> Option<StopReason> {
-        self.idle_epochs = if standing.evals == self.begun_evals { self.idle_epochs + 1 } else { 0 };
+        self.idle_epochs = if standing.evals == self.begun.evals { self.idle_epochs + 1 } else { 0 };
         (self.idle_epochs == IDLE_EPOCHS_MAX).then_some(StopReason::Dry)
     }
 }
@@ -218,7 +246,7 @@ mod tests {
 
     use super::*;
     use crate::evolve::observer::Undisturbed;
-    use crate::model::cells::{Rules, SearchState, Stacks};
+    use crate::model::cells::{Ask, Rules, SearchState, Stacks};
     use crate::model::{Guide, GuideSample, MaskSet, Target};
 
     /// A search of one white pixel. Its objective falls by a share of itself each round, and it counts its calls.
@@ -257,14 +285,17 @@ mod tests {
             Ok(())
         }
 
-        fn advance(&mut self, rounds: u32) -> Result<()> {
+        fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
             self.calls.push(rounds);
             for _ in 0..rounds {
+                if is_over() {
+                    return Ok(false);
+                }
                 self.standing.rounds += 1;
                 self.standing.evals += self.evals_per_round;
                 self.standing.objective -= self.standing.objective / self.loss;
             }
-            Ok(())
+            Ok(true)
         }
 
         fn renormalise(&mut self) -> Result<()> {

@@ -3,6 +3,7 @@
 //! Everything here is decided by the seed and by the fitness that an evaluator reports. Nothing here knows Vulkan, a
 //! file or a clock.
 
+pub mod brake;
 mod breeder;
 pub mod cells;
 pub mod color;
@@ -24,6 +25,7 @@ pub mod style;
 /// result. It is in every key, so raising it makes every existing output out of date.
 pub const ALGORITHM_VERSION: u32 = 2;
 
+pub use brake::Brake;
 pub use color::{ColorMode, ColorRule};
 pub use ended::{Ended, Ending, Tally};
 pub use evolution::{Evolution, Outcome, Step, StopReason};

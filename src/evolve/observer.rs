@@ -1,5 +1,6 @@
 //! Observers, which watch the work on a picture in either scheme and may end it.
 
+use super::brake::Brake;
 use super::evolution::{Evolution, StopReason};
 use super::objective::{self, lowers_sae_alone};
 use crate::error::Result;
@@ -95,6 +96,12 @@ pub trait Observer {
         false
     }
 
+    /// What may end a search in the middle of a round, which is then as if it had never begun. It is taken once for
+    /// each step.
+    fn brake(&self) -> Brake {
+        Brake::default()
+    }
+
     /// Called after every generation of the paper's scheme, and after every round of a search if some observer looks at
     /// rounds. A returned reason ends the work. In a search the depths are not yet spread.
     ///
@@ -138,6 +145,10 @@ impl<O: Observer> Observer for Option<O> {
         self.as_ref().is_some_and(O::looks_at_rounds)
     }
 
+    fn brake(&self) -> Brake {
+        self.as_ref().map_or_else(Brake::default, O::brake)
+    }
+
     fn after_round(&mut self, seen: &mut Seen<'_>) -> Result<Option<StopReason>> {
         self.as_mut().map_or(Ok(None), |observer| observer.after_round(seen))
     }
@@ -160,6 +171,10 @@ impl<A: Observer + ?Sized, B: Observer + ?Sized> Observer for (&mut A, &mut B) {
 
     fn looks_at_rounds(&self) -> bool {
         self.0.looks_at_rounds() || self.1.looks_at_rounds()
+    }
+
+    fn brake(&self) -> Brake {
+        self.0.brake().and(self.1.brake())
     }
 
     fn after_round(&mut self, seen: &mut Seen<'_>) -> Result<Option<StopReason>> {

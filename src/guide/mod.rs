@@ -10,6 +10,8 @@ mod sizes;
 mod smooth;
 mod tensor;
 
+use rayon::prelude::*;
+
 use crate::model::Target;
 use crate::model::fly::UNITS_PER_PX;
 use crate::model::guide::{GUIDE_PX, Guide, GuideSample, SIZE_ONE};
@@ -69,8 +71,8 @@ pub fn flowing(target: &Target, flow: &Flow<'_>) -> Guide {
     guide(&tensors, sample)
 }
 
-fn guide(tensors: &Tensors, sample: impl Fn(usize) -> GuideSample) -> Guide {
-    let samples = (0..tensors.trace.len()).map(sample).collect();
+fn guide(tensors: &Tensors, sample: impl Fn(usize) -> GuideSample + Send + Sync) -> Guide {
+    let samples = (0..tensors.trace.len()).into_par_iter().with_min_len(1 << 10).map(sample).collect();
     Guide { columns: tensors.columns as u32, rows: tensors.rows as u32, samples }
 }
 

@@ -7,7 +7,7 @@ use ash::vk;
 use super::handle::Owned;
 use super::image::ImageFormat;
 use super::pipeline_layout::{BindingKind, PipelineLayout};
-use super::{Device, refused};
+use super::{Device, DeviceKind, refused};
 use crate::error::Result;
 
 /// First word of every SPIR-V module.
@@ -77,7 +77,12 @@ impl ComputePipeline {
         let constants = Specialization::new(shader.specialization);
         let specialization = constants.info();
         let stage = stage(vk::ShaderStageFlags::COMPUTE, module.get(), &specialization);
-        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.raw())];
+        // Only software Vulkan is asked for parts of a dispatch.
+        let flags = match device.info().kind {
+            DeviceKind::Cpu => vk::PipelineCreateFlags::DISPATCH_BASE,
+            _ => vk::PipelineCreateFlags::empty(),
+        };
+        let infos = [vk::ComputePipelineCreateInfo::default().flags(flags).stage(stage).layout(layout.raw())];
         // SAFETY: V1, V4.
         let created = unsafe { device.raw().create_compute_pipelines(device.pipeline_cache(), &infos, None) };
         let handle = take_one(device, name, created)?;

@@ -61,4 +61,5 @@ mod transparency;
 mod video;
 mod vulkan;
 mod vulkan_failures;
+mod within_a_round;
 mod workshop;

@@ -26,7 +26,7 @@ fn parrots(x0: u32, y0: u32, width_px: u32, height_px: u32) -> Target {
 }
 
 /// The photograph where some pixels count more, and others should stay free.
-fn uneven(width_px: u32, height_px: u32) -> Target {
+pub fn uneven(width_px: u32, height_px: u32) -> Target {
     let places = || (0..width_px * height_px).map(|place| (place % width_px, place / width_px));
     let weights = places().map(|(x, y)| 1 + ((x / 5 + y / 7) % 16) as u8).collect();
     let transparent = places().map(|(x, y)| x > width_px / 2 && y > height_px / 2).collect();
@@ -34,7 +34,7 @@ fn uneven(width_px: u32, height_px: u32) -> Target {
 }
 
 /// Tiles of the style `spray` in random masks, which have shades and holes, too.
-fn course(target: Target, fly_count: usize) -> Course {
+pub fn course(target: Target, fly_count: usize) -> Course {
     let recipe = Recipe::spray().tiles(fly_count as u64).seed(7);
     let course = work(&Arc::new(target), &recipe).expect("the recipe is right").course;
     let masks = translucent_masks(&mut stream(5));

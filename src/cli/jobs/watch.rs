@@ -7,7 +7,7 @@ use super::recorder::Recorder;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::{EvolutionProgress, Measure, Progress};
 use crate::error::Result;
-use crate::evolve::{Observer, Seen, StopReason};
+use crate::evolve::{Brake, Observer, Seen, StopReason};
 use crate::studio::{Scheme, Settings};
 
 /// The aimed-at time between two looks at the clock. After a shorter time the next look comes later, after a longer one
@@ -96,6 +96,13 @@ impl Observer for Watch<'_> {
 
     fn looks_at_rounds(&self) -> bool {
         self.recorder.is_some()
+    }
+
+    fn brake(&self) -> Brake {
+        let interrupt = self.interrupt.brake();
+        let Some(limit) = self.time_limit else { return interrupt };
+        let began = self.began;
+        interrupt.and(Brake::new(move || (began.elapsed() >= limit).then_some(StopReason::Time)))
     }
 
     fn after_round(&mut self, seen: &mut Seen<'_>) -> Result<Option<StopReason>> {

@@ -9,6 +9,7 @@ use signal_hook::low_level::unregister;
 use signal_hook::{SigId, flag};
 
 use crate::error::{Error, Result};
+use crate::evolve::{Brake, StopReason};
 
 /// Exit code after an orderly end before the work was done. The same command may be run again.
 pub(crate) const EXIT_INTERRUPTED: u8 = 75;
@@ -131,6 +132,12 @@ impl Interrupt {
     /// Whether a signal came. Does not wait for writers.
     pub(crate) fn is_requested(&self) -> bool {
         self.requested.load(Ordering::Relaxed)
+    }
+
+    /// Ends the work in the middle of a round if a signal comes.
+    pub(crate) fn brake(&self) -> Brake {
+        let requested = Arc::clone(&self.requested);
+        Brake::new(move || requested.load(Ordering::Relaxed).then_some(StopReason::Interrupted))
     }
 
     /// # Errors

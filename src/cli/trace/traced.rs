@@ -9,7 +9,7 @@ use super::tracer::{Tracer, Weight};
 use crate::error::Result;
 use crate::evolve::objective::lowers_sae_alone;
 use crate::evolve::{Observer, Seen, Stage, StopReason};
-use crate::model::cells::{Course, Search, SearchState, Stacks, Standing};
+use crate::model::cells::{Ask, Course, Search, SearchState, Stacks, Standing};
 use crate::model::{Canvas, Change, Evaluation, Evaluator, Fly, Lane, Layers, Mosaic, Painter, Population, Scene};
 use crate::studio::{Instruments, Running};
 
@@ -101,6 +101,11 @@ impl Search for TracedSearch {
         self.search.advance(rounds)
     }
 
+    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
+        let _span = self.tracer.frequent_span("rounds").tell("rounds", rounds);
+        self.search.advance_until(rounds, is_over)
+    }
+
     fn renormalise(&mut self) -> Result<()> {
         let _span = self.tracer.frequent_span("spread depths");
         self.search.renormalise()
@@ -113,6 +118,11 @@ impl Search for TracedSearch {
     fn read_back(&mut self) -> Result<SearchState> {
         let _span = self.tracer.frequent_span("read back");
         self.search.read_back()
+    }
+
+    fn sae(&mut self) -> Result<u64> {
+        let _span = self.tracer.frequent_span("SAE");
+        self.search.sae()
     }
 
     fn read_back_stacks(&mut self) -> Result<Stacks> {

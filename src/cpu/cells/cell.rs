@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 use super::area::{Area, Exchanged};
 use super::cover::Cover;
 use super::ground::{Coloring, Ground, Paint, Piece, Swap};
+use super::halt::Halt;
 use super::shared::Shared;
 use crate::model::cells::Course;
 use crate::model::cells::footprint::Footprint;
@@ -49,25 +50,80 @@ struct Candidate {
     change: i64,
 }
 
+/// Pixels of the boxes of children between two looks: some tenths of a millisecond, be the tiles small or large.
+const PIXELS_PER_LOOK: u32 = 1 << 16;
+/// What a step counts besides.
+const PIXELS_PER_STEP: u32 = 1 << 6;
+
 /// One cell at work.
 pub struct Cell<'a, G: Ground> {
     pub shared: &'a Shared<'a>,
+    pub halt: &'a Halt<'a>,
     pub number: u32,
     pub area: Area<'a, G>,
     pub members: Vec<Member>,
     pub desk: G::Desk,
     pub done: Done,
+    /// Pixels of the boxes of children since the last look.
+    pub unseen_px: u32,
 }
 
 impl<'a, G: Ground> Cell<'a, G> {
-    /// Makes all steps of the round, then removes the flies that do not help.
+    /// Makes all steps of the round, then removes the flies that do not help. It leaves off where it is halted.
     pub fn run(&mut self, chain: Chain) {
+        // A cell that nobody has begun needs no look at a clock to leave it so.
+        if self.halt.was_called() {
+            return;
+        }
         let steps = self.members.len() as u32 * self.shared.course.rules.steps_per_fly;
         for step in 0..steps {
             self.step(chain.then(step));
+            if self.is_halted() {
+                return;
+            }
         }
         for place in 0..self.members.len() {
             self.remove_useless(place);
+            if self.is_halted() {
+                return;
+            }
+        }
+    }
+
+    /// Whether it is halted, as far as anybody has looked.
+    fn is_halted(&mut self) -> bool {
+        self.unseen_px = self.unseen_px.saturating_add(PIXELS_PER_STEP);
+        if self.unseen_px < PIXELS_PER_LOOK {
+            return false;
+        }
+        self.unseen_px = 0;
+        self.halt.is_called()
+    }
+
+    /// Removes all members from their pixels.
+    pub fn lift(&mut self) {
+        for place in 0..self.members.len() {
+            let Member { index, fly, .. } = self.members[place];
+            let (footprint, suit) = (self.footprint(&fly), self.suit(&fly));
+            let swap = Swap {
+                index,
+                old: Piece { fly: &fly, footprint: &footprint, suit: suit.as_ref() },
+                new: Piece { fly: &Fly::ABSENT, footprint: &Footprint::EMPTY, suit: None },
+            };
+            if fly.alive {
+                G::swap(&mut self.area, self.shared, self.number, &swap, 0);
+            }
+        }
+    }
+
+    /// Puts all members where they are said to be; none of them may lie on any pixel.
+    pub fn put_back(&mut self) {
+        for place in 0..self.members.len() {
+            let fly = std::mem::replace(&mut self.members[place].fly, Fly::ABSENT);
+            if fly.alive {
+                let footprint = self.footprint(&fly);
+                self.replace(&Candidate { victim: place, fly, footprint, is_birth: true, change: 0 });
+            }
         }
     }
 
@@ -237,6 +293,7 @@ impl<'a, G: Ground> Cell<'a, G> {
             return None;
         }
         let footprint = Footprint::of(&child, (shared.grid.width_px, shared.grid.height_px));
+        self.unseen_px = self.unseen_px.saturating_add(footprint.area_px());
         if shared.grid.cell_of(&footprint) != self.number {
             return None;
         }

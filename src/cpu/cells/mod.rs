@@ -4,11 +4,14 @@ mod area;
 mod block;
 mod cell;
 mod cover;
+mod cut;
 mod dressed;
 mod exchange;
 mod glazed;
 mod ground;
+mod halt;
 mod laid;
+mod laying;
 mod opaque;
 mod pixels;
 mod search;
@@ -22,27 +25,32 @@ use rayon::prelude::*;
 pub use self::search::CpuSearch;
 
 use self::area::Area;
-use self::block::PIXELS;
-use self::cell::{Cell, Done, Member, turn_penalty};
+use self::cell::{Cell, Done, Member};
+use self::cut::Changed;
 use self::ground::Ground;
-use self::pixels::Bare;
+use self::halt::{Halt, NEVER};
 use self::shared::Shared;
 use crate::error::Result;
 use crate::model::Fly;
 use crate::model::blocks::{depth_order, index_of};
 use crate::model::cells::footprint::Footprint;
 use crate::model::cells::grid::{BLOCK_SIDE_PX, cell_side_px};
-use crate::model::cells::pixel::{INSIDE, TRANSPARENT, difference};
 use crate::model::cells::random::{Chain, Draw};
 use crate::model::cells::rules::STEP_FIRST;
-use crate::model::cells::{Course, Search, SearchState, Stacks, Standing, depths, leash, operators};
+use crate::model::cells::{Ask, Course, Search, SearchState, Stacks, Standing, depths, leash, operators};
 use crate::model::cells::{Grid, NO_CELL};
 use crate::model::fly::Z_MAX;
-use crate::model::tile::pack;
+
+/// Flies that are given their cells between two looks.
+const FLIES_AT_ONCE: usize = 256;
+
+/// A cell with its blocks and its members.
+type Work<'a, G> = (u32, Area<'a, G>, Vec<Member>);
 
 /// A search among tiles of one kind.
 struct Cells<G> {
     course: Course,
+    /// The blocks that were laid; all of them unless all flies are absent.
     blocks: Vec<G>,
     /// Blocks along the width.
     columns: u32,
@@ -51,118 +59,86 @@ struct Cells<G> {
     /// For each fly, what [`Member::origin`] says.
     origins: Vec<Fly>,
     fitness: Vec<AtomicI64>,
+    /// Marginal fitness when the round began.
+    fitness_before: Vec<i64>,
     depths: Vec<AtomicU32>,
     owners: Vec<u32>,
     standing: Standing,
+    /// What a round that was cut short has left on the pixels.
+    changed: Option<Changed>,
+    /// Whether the pixels still hold depths from before the last spreading.
+    has_old_depths: bool,
 }
 
 impl<G: Ground> Cells<G> {
     fn new(course: Course) -> Self {
-        let (width, height) = (course.target.width_px(), course.target.height_px());
-        let (columns, rows) = (width.div_ceil(BLOCK_SIDE_PX), height.div_ceil(BLOCK_SIDE_PX));
         let fly_count = course.fly_count;
         let mut search = Self {
+            blocks: Vec::new(),
+            columns: course.target.width_px().div_ceil(BLOCK_SIDE_PX),
             course,
-            blocks: vec![G::outside(); (columns * rows) as usize],
-            columns,
             flies: vec![Fly::ABSENT; fly_count],
             steps: vec![STEP_FIRST; fly_count],
             origins: vec![Fly::ABSENT; fly_count],
             fitness: (0..fly_count).map(|_| AtomicI64::new(0)).collect(),
+            fitness_before: Vec::new(),
             depths: (0..fly_count).map(|_| AtomicU32::new(Z_MAX)).collect(),
             owners: vec![NO_CELL; fly_count],
             standing: Standing::default(),
+            changed: None,
+            has_old_depths: false,
         };
-        search.clear();
+        search.standing.objective = search.bare_objective();
         search
     }
 
     /// Removes all flies.
     fn clear(&mut self) {
-        let Course { target, rules, .. } = &self.course;
-        let (width, height) = (target.width_px(), target.height_px());
-        for (number, block) in self.blocks.iter_mut().enumerate() {
-            *block = G::outside();
-            let (x, y) = (number as u32 % self.columns * BLOCK_SIDE_PX, number as u32 / self.columns * BLOCK_SIDE_PX);
-            for row in 0..BLOCK_SIDE_PX.min(height - y) {
-                for column in 0..BLOCK_SIDE_PX.min(width - x) {
-                    let place = ((y + row) * width + x + column) as usize;
-                    let color = pack(target.pixels()[place]);
-                    let pixel = (row * BLOCK_SIDE_PX + column) as usize;
-                    let weight = target.weights().map_or(1, |weights| i32::from(weights[place]));
-                    let is_unwanted = target.transparent().is_some_and(|transparent| transparent[place]);
-                    let (flag, bare) =
-                        if is_unwanted { (TRANSPARENT, 0) } else { (0, difference(color, rules.background) * weight) };
-                    let bare = Bare { target: color | INSIDE | flag, weight, error: bare };
-                    block.lay_bare(pixel, &bare, rules);
-                }
-            }
-        }
+        self.blocks.clear();
         self.flies.fill(Fly::ABSENT);
         self.steps.fill(STEP_FIRST);
         self.origins.fill(Fly::ABSENT);
         self.fitness.iter_mut().for_each(|fitness| *fitness.get_mut() = 0);
-        self.standing = Standing { objective: self.objective(), ..Standing::default() };
-    }
-
-    /// The objective, summed over pixels and flies.
-    fn objective(&self) -> i64 {
-        let of_pixels: i64 = self
-            .blocks
-            .iter()
-            .flat_map(|block| {
-                (0..PIXELS).filter(|&pixel| block.target()[pixel] & INSIDE != 0).map(move |pixel| (block, pixel))
-            })
-            .map(|(block, pixel)| block.objective(pixel, &self.course.rules))
-            .sum();
-        let of_flies: i64 = self.flies.iter().map(|fly| turn_penalty(&self.course, fly)).sum();
-        of_pixels + of_flies
+        self.standing = Standing::default();
+        (self.changed, self.has_old_depths) = (None, false);
     }
 
     fn size_px(&self) -> (u32, u32) {
         (self.course.target.width_px(), self.course.target.height_px())
     }
 
-    /// Makes one round.
-    fn round(&mut self) {
-        let grid = Grid::new(
-            self.course.rules.seed,
-            self.standing.rounds,
-            self.size_px(),
-            cell_side_px(self.course.rules.side),
-        );
-        let members = self.deal(&grid);
-        let shared = Shared {
-            course: &self.course,
-            grid: &grid,
-            owners: &self.owners,
-            fitness: &self.fitness,
-            depths: &self.depths,
-            is_plain: self.course.is_plain(),
-        };
-        let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Step);
-        let mut areas: Vec<Vec<&mut G>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
-        for (number, block) in self.blocks.iter_mut().enumerate() {
-            let (x, y) = (number as u32 % self.columns * BLOCK_SIDE_PX, number as u32 / self.columns * BLOCK_SIDE_PX);
-            areas[grid.cell_at(x, y) as usize].push(block);
+    /// The grid of the round that is made next.
+    fn grid(&self) -> Grid {
+        let rules = &self.course.rules;
+        Grid::new(rules.seed, self.standing.rounds, self.size_px(), cell_side_px(rules.side))
+    }
+
+    /// Makes one round; returns false if it was halted, which leaves the search where the round began.
+    fn round(&mut self, halt: &Halt<'_>) -> bool {
+        if !self.settle(halt) {
+            return false;
         }
-        let mut work: Vec<_> = members.into_iter().zip(areas).zip(0..).filter(|((m, _), _)| !m.is_empty()).collect();
-        work.sort_by_key(|((members, _), number)| (std::cmp::Reverse(members.len()), *number));
-        let results: Vec<(Vec<Member>, Done)> = work
+        let grid = self.grid();
+        let Some(members) = self.deal(&grid, halt) else { return false };
+        self.fitness_before.clear();
+        self.fitness_before.extend(self.fitness.iter_mut().map(|fitness| *fitness.get_mut()));
+        let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Step);
+        let (work, shared) = self.split(&grid, members);
+        let results: Vec<(u32, Vec<Member>, Done)> = work
             .into_par_iter()
             .with_max_len(1)
-            .map(|((members, blocks), number)| {
-                let [x0, y0, x1, _] = grid.bounds(number);
-                let columns = (x1.div_ceil(BLOCK_SIDE_PX) - x0 / BLOCK_SIDE_PX) as usize;
-                let first = ((x0 / BLOCK_SIDE_PX) as i32, (y0 / BLOCK_SIDE_PX) as i32);
-                let area = Area::new(blocks, columns, first);
-                let shared = &shared;
-                let mut cell = Cell { shared, number, area, members, desk: G::Desk::default(), done: Done::default() };
+            .map(|(number, area, members)| {
+                let (desk, done) = (G::Desk::default(), Done::default());
+                let mut cell = Cell { shared: &shared, halt, number, area, members, desk, done, unseen_px: 0 };
                 cell.run(chain.then(number));
-                (cell.members, cell.done)
+                (number, cell.members, cell.done)
             })
             .collect();
-        for (members, done) in results {
+        if halt.was_called() {
+            self.take_back(results.into_iter().map(|(number, members, _)| (number, members)).collect());
+            return false;
+        }
+        for (_, members, done) in results {
             for Member { index, fly, step, origin } in members {
                 self.flies[index as usize] = fly;
                 self.steps[index as usize] = step;
@@ -175,6 +151,35 @@ impl<G: Ground> Cells<G> {
         }
         self.standing.rounds += 1;
         self.refresh(&grid);
+        true
+    }
+
+    /// The blocks and the members of each cell that has any, the longest work first, and what the cells share.
+    fn split<'a>(&'a mut self, grid: &'a Grid, members: Vec<Vec<Member>>) -> (Vec<Work<'a, G>>, Shared<'a>) {
+        let columns = self.columns;
+        let mut areas: Vec<Vec<&mut G>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+        for (number, block) in self.blocks.iter_mut().enumerate() {
+            let (x, y) = (number as u32 % columns * BLOCK_SIDE_PX, number as u32 / columns * BLOCK_SIDE_PX);
+            areas[grid.cell_at(x, y) as usize].push(block);
+        }
+        let area = |number: u32, blocks| {
+            let [x0, y0, x1, _] = grid.bounds(number);
+            let columns = (x1.div_ceil(BLOCK_SIDE_PX) - x0 / BLOCK_SIDE_PX) as usize;
+            Area::new(blocks, columns, ((x0 / BLOCK_SIDE_PX) as i32, (y0 / BLOCK_SIDE_PX) as i32))
+        };
+        let cells = members.into_iter().zip(areas).zip(0..).filter(|((members, _), _)| !members.is_empty());
+        let mut work: Vec<_> =
+            cells.map(|((members, blocks), number)| (number, area(number, blocks), members)).collect();
+        work.sort_by_key(|(number, _, members)| (std::cmp::Reverse(members.len()), *number));
+        let shared = Shared {
+            course: &self.course,
+            grid,
+            owners: &self.owners,
+            fitness: &self.fitness,
+            depths: &self.depths,
+            is_plain: self.course.is_plain(),
+        };
+        (work, shared)
     }
 
     /// Recomputes marginal fitness if cells only estimate it.
@@ -190,26 +195,43 @@ impl<G: Ground> Cells<G> {
         G::refresh(&self.blocks, &self.flies, &shared);
     }
 
-    /// Assigns every fly to its cell.
-    fn deal(&mut self, grid: &Grid) -> Vec<Vec<Member>> {
-        let chain = Chain::new(self.course.rules.seed, self.standing.rounds, Draw::Deal);
-        let mut members: Vec<Vec<Member>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+    /// Assigns every fly to its cell; `None` if it was halted.
+    fn deal(&mut self, grid: &Grid, halt: &Halt<'_>) -> Option<Vec<Vec<Member>>> {
         let round = self.standing.rounds;
-        for (index, fly) in (0_u32..).zip(&self.flies) {
-            let cell = if fly.alive {
+        let chain = Chain::new(self.course.rules.seed, round, Draw::Deal);
+        let cell_of = |index: u32, fly: &Fly| {
+            if fly.alive {
                 grid.cell_of(&Footprint::of(fly, self.size_px()))
             } else if self.course.rules.class_of(index).first_round > round {
                 NO_CELL
             } else {
                 self.deal_absent(grid, chain.then(index))
-            };
-            self.owners[index as usize] = cell;
+            }
+        };
+        let mut owners = vec![NO_CELL; self.flies.len()];
+        let parts = owners.par_chunks_mut(FLIES_AT_ONCE).zip(self.flies.par_chunks(FLIES_AT_ONCE));
+        parts.enumerate().for_each(|(part, (owners, flies))| {
+            if !halt.is_called() {
+                let first = (part * FLIES_AT_ONCE) as u32;
+                owners
+                    .iter_mut()
+                    .zip(flies)
+                    .zip(first..)
+                    .for_each(|((owner, fly), index)| *owner = cell_of(index, fly));
+            }
+        });
+        if halt.was_called() {
+            return None;
+        }
+        self.owners = owners;
+        let mut members: Vec<Vec<Member>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+        for ((index, fly), &cell) in (0_u32..).zip(&self.flies).zip(&self.owners) {
             if cell != NO_CELL {
                 let (step, origin) = (self.steps[index as usize], self.origins[index as usize]);
                 members[cell as usize].push(Member { index, fly: *fly, step, origin });
             }
         }
-        members
+        Some(members)
     }
 
     /// The cell of the worst of some random pixels.
@@ -235,6 +257,7 @@ impl<G: Ground> Search for Cells<G> {
     fn load(&mut self, flies: &[Fly]) -> Result<()> {
         assert_eq!(flies.len(), self.course.fly_count, "a search keeps its number of flies");
         self.clear();
+        self.lay(&NEVER);
         let (target, rules) = (&self.course.target, &self.course.rules);
         let grid = Grid::whole(target.width_px(), target.height_px());
         let shared = Shared {
@@ -248,8 +271,8 @@ impl<G: Ground> Search for Cells<G> {
         let area = Area::new(self.blocks.iter_mut().collect(), self.columns as usize, (0, 0));
         let member = |(index, &origin)| Member { index, fly: Fly::ABSENT, step: STEP_FIRST, origin };
         let members = (0..).zip(flies).map(member).collect();
-        let mut cell =
-            Cell { shared: &shared, number: 0, area, members, desk: G::Desk::default(), done: Done::default() };
+        let (desk, done) = (G::Desk::default(), Done::default());
+        let mut cell = Cell { shared: &shared, halt: &NEVER, number: 0, area, members, desk, done, unseen_px: 0 };
         // Nearest first, so that the deepest flies are the ones that find no room.
         for key in depth_order(flies) {
             let index = index_of(key) as usize;
@@ -270,9 +293,9 @@ impl<G: Ground> Search for Cells<G> {
         Ok(())
     }
 
-    fn advance(&mut self, rounds: u32) -> Result<()> {
-        (0..rounds).for_each(|_| self.round());
-        Ok(())
+    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
+        let halt = Halt::new(is_over);
+        Ok((0..rounds).all(|_| self.round(&halt)))
     }
 
     fn renormalise(&mut self) -> Result<()> {
@@ -280,10 +303,7 @@ impl<G: Ground> Search for Cells<G> {
         for (depth, fly) in self.depths.iter().zip(&self.flies) {
             depth.store(fly.z, Ordering::Relaxed);
         }
-        let depths = &self.depths;
-        self.blocks.par_iter_mut().for_each(|block| {
-            block.renumber(|fly| depths[fly as usize].load(Ordering::Relaxed));
-        });
+        self.has_old_depths = true;
         Ok(())
     }
 
@@ -296,7 +316,15 @@ impl<G: Ground> Search for Cells<G> {
         Ok(SearchState { flies: self.flies.clone(), steps: self.steps.clone(), fitness })
     }
 
+    fn sae(&mut self) -> Result<u64> {
+        if !self.is_bare() {
+            self.settle(&NEVER);
+        }
+        Ok(self.shown_sae())
+    }
+
     fn read_back_stacks(&mut self) -> Result<Stacks> {
+        self.settle(&NEVER);
         let (width, height) = self.size_px();
         let stack_at = |x: u32, y: u32| {
             let block = &self.blocks[(y / BLOCK_SIDE_PX * self.columns + x / BLOCK_SIDE_PX) as usize];

@@ -13,7 +13,7 @@ use super::ground::{Coloring, Ground, Paint, Swap};
 use super::pixels::{Bare, Pixels};
 use super::shared::Shared;
 use crate::model::cells::color::mean;
-use crate::model::cells::pixel::{BACKGROUND_Z, STACK_DEPTH, TRANSPARENT};
+use crate::model::cells::pixel::{BACKGROUND_Z, STACK_DEPTH, TRANSPARENT, difference};
 use crate::model::cells::rules::{ColorSource, Rules};
 use crate::model::tile::pack;
 use crate::model::{Fly, NO_FLY};
@@ -33,11 +33,14 @@ impl Pixels for Block {
     }
 
     fn lay_bare(&mut self, pixel: usize, bare: &Bare, rules: &Rules) {
-        let hole = if bare.target & TRANSPARENT == 0 { rules.penalties.hole as i32 } else { 0 };
         self.target[pixel] = bare.target;
         self.weight[pixel] = bare.weight;
-        self.ground[pixel] = bare.error + hole + rules.penalties.overlap as i32;
+        self.ground[pixel] = bare.error + hole(bare, rules) + rules.penalties.overlap as i32;
         self.surface(pixel, |_| BACKGROUND_Z as i32);
+    }
+
+    fn bare_objective(bare: &Bare, rules: &Rules) -> i64 {
+        i64::from(bare.error + hole(bare, rules))
     }
 
     fn target(&self) -> &Plane<u32> {
@@ -66,6 +69,13 @@ impl Pixels for Block {
         i64::from(self.top.error[pixel]) + i64::from(rules.penalties.overlap) * (i64::from(self.depth[pixel]) - 1)
     }
 
+    fn shown_error(&self, pixel: usize, background: u32) -> u64 {
+        match self.depth[pixel] {
+            0 => difference(self.target[pixel], background) as u64,
+            _ => (self.stack[pixel][0].error / self.weight[pixel]) as u64,
+        }
+    }
+
     fn stack(&self, pixel: usize) -> Vec<(u32, i32)> {
         self.stack[pixel][..usize::from(self.depth[pixel])].iter().map(|entry| (entry.fly, entry.error)).collect()
     }
@@ -79,6 +89,11 @@ impl Pixels for Block {
             }
         }
     }
+}
+
+/// What a pixel costs as long as no tile covers it.
+fn hole(bare: &Bare, rules: &Rules) -> i32 {
+    if bare.target & TRANSPARENT == 0 { rules.penalties.hole as i32 } else { 0 }
 }
 
 impl Ground for Block {

@@ -23,6 +23,8 @@ pub trait Pixels: Clone + Send + Sync + 'static {
     fn outside() -> Self;
     /// Removes all tiles from a pixel.
     fn lay_bare(&mut self, pixel: usize, bare: &Bare, rules: &Rules);
+    /// What a pixel without tiles adds to the objective.
+    fn bare_objective(bare: &Bare, rules: &Rules) -> i64;
     /// The target, packed, with flags.
     fn target(&self) -> &Plane<u32>;
     /// Number of pixels whose stacks are full.
@@ -35,6 +37,8 @@ pub trait Pixels: Clone + Send + Sync + 'static {
     fn seen(&self, pixel: usize) -> (i32, u32);
     /// A pixel's part of the objective.
     fn objective(&self, pixel: usize, rules: &Rules) -> i64;
+    /// Error of what a wanted pixel shows over this background, without its weight.
+    fn shown_error(&self, pixel: usize, background: u32) -> u64;
     /// What [`crate::model::cells::Stacks`] holds for a pixel.
     fn stack(&self, pixel: usize) -> Vec<(u32, i32)>;
     /// Sets new depths; their order must be the same as before.

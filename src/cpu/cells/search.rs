@@ -5,7 +5,7 @@ use super::block::Block;
 use super::glazed::Glazed;
 use crate::error::Result;
 use crate::model::Fly;
-use crate::model::cells::{Course, Search, SearchState, Stacks, Standing};
+use crate::model::cells::{Ask, Course, Search, SearchState, Stacks, Standing};
 
 /// A search on the CPU.
 pub struct CpuSearch {
@@ -34,8 +34,8 @@ impl Search for CpuSearch {
         self.cells.load(flies)
     }
 
-    fn advance(&mut self, rounds: u32) -> Result<()> {
-        self.cells.advance(rounds)
+    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
+        self.cells.advance_until(rounds, is_over)
     }
 
     fn renormalise(&mut self) -> Result<()> {
@@ -48,6 +48,10 @@ impl Search for CpuSearch {
 
     fn read_back(&mut self) -> Result<SearchState> {
         self.cells.read_back()
+    }
+
+    fn sae(&mut self) -> Result<u64> {
+        self.cells.sae()
     }
 
     fn read_back_stacks(&mut self) -> Result<Stacks> {

@@ -37,6 +37,10 @@ impl Pixels for Glazed {
         self.error[pixel] = bare.error as u32;
     }
 
+    fn bare_objective(bare: &Bare, _: &Rules) -> i64 {
+        i64::from(bare.error)
+    }
+
     fn target(&self) -> &Plane<u32> {
         &self.target
     }
@@ -59,6 +63,10 @@ impl Pixels for Glazed {
 
     fn objective(&self, pixel: usize, _: &Rules) -> i64 {
         i64::from(self.error[pixel])
+    }
+
+    fn shown_error(&self, pixel: usize, _: u32) -> u64 {
+        u64::from(self.error[pixel] / self.weight[pixel])
     }
 
     fn stack(&self, pixel: usize) -> Vec<(u32, i32)> {

@@ -2,6 +2,7 @@
 
 use super::buffers::LaneSlices;
 use super::layout::SearchHeader;
+use super::mark::Mark;
 use super::pass::Variant;
 use super::plan::Plan;
 use crate::error::Error;
@@ -24,6 +25,10 @@ pub(super) struct Lane {
     pub failure: Option<Error>,
     /// Whether the pixels still hold depths from before the last spreading.
     pub has_old_depths: bool,
+    /// Where it may be taken back to.
+    pub mark: Option<Mark>,
+    /// Whether it was taken back, and its pixels were not.
+    pub has_old_pixels: bool,
 }
 
 impl Lane {
@@ -41,6 +46,8 @@ impl Lane {
             has_failed: false,
             failure: None,
             has_old_depths: false,
+            mark: None,
+            has_old_pixels: false,
         }
     }
 
@@ -68,5 +75,29 @@ impl Lane {
             objective: self.objective + wide(header.change_low, header.change_high) as i64,
         };
         self.iterations = header.iterations;
+    }
+
+    /// What the header says of a lane between two rounds.
+    pub fn header(&self) -> SearchHeader {
+        let Standing { rounds, evals, births, accepted, objective } = self.standing;
+        let words = |wide: u64| (wide as u32, (wide >> 32) as u32);
+        let (evals_low, evals_high) = words(evals);
+        let (births_low, births_high) = words(births);
+        let (accepted_low, accepted_high) = words(accepted);
+        let (change_low, change_high) = words((objective - self.objective) as u64);
+        SearchHeader {
+            round: rounds,
+            wanted: self.wanted,
+            iterations: self.iterations,
+            evals_low,
+            evals_high,
+            births_low,
+            births_high,
+            accepted_low,
+            accepted_high,
+            change_low,
+            change_high,
+            ..SearchHeader::default()
+        }
     }
 }

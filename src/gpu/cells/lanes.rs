@@ -24,20 +24,25 @@ use crate::vk::{Device, DeviceKind, PassTime, ReadTicket, Recorder, Timing};
 /// Most iterations of a submission, which keep it well below a watchdog's second. Software Vulkan has no watchdog, but
 /// runs the lanes of a dispatch one after the other; there all lanes share this number.
 const ITERATIONS_MAX: u32 = 16;
+/// Most cells that a submission to software Vulkan takes as far as their budget allows: tenths of a second of work.
+/// An iteration of more of them takes several submissions.
+const CELLS_MAX: u32 = 64;
 
 /// Searches on a Vulkan device that share its dispatches. Their sizes, numbers of flies and rules may differ.
 ///
 /// Memory bounds the number of lanes: no buffer that they share may be larger than shaders can see, and several lanes
 /// together may take half of the device's memory.
 pub struct VulkanLanes {
-    device: Arc<Device>,
-    recorder: Recorder,
+    pub(super) device: Arc<Device>,
+    pub(super) recorder: Recorder,
     pass: CellsPass,
     kins: Vec<Kin>,
     /// By number, without those that are free.
-    lanes: Vec<Option<Lane>>,
+    pub(super) lanes: Vec<Option<Lane>>,
     /// Whether the rules on the device and the stages of the pass are those of the lanes.
     is_arranged: bool,
+    /// Of an iteration that takes several submissions, the first cell of the next one; 0 between iterations.
+    next_cell: u32,
 }
 
 /// The lanes of one variant. They share buffers that no other lanes use, so that dispatches of different kins need no
@@ -63,6 +68,7 @@ impl VulkanLanes {
             kins: Vec::new(),
             lanes: Vec::new(),
             is_arranged: false,
+            next_cell: 0,
         })
     }
 
@@ -124,7 +130,7 @@ impl VulkanLanes {
     }
 
     /// Where a lane's slice lies in the buffer of a part.
-    fn range(&self, number: usize, part: Part) -> BufferRange {
+    pub(super) fn range(&self, number: usize, part: Part) -> BufferRange {
         let lane = self.lane(number);
         self.kin(lane.variant).buffers.range(part, &lane.slices)
     }
@@ -135,11 +141,11 @@ impl VulkanLanes {
         self.recorder.pass_times()
     }
 
-    fn lane(&self, lane: usize) -> &Lane {
+    pub(super) fn lane(&self, lane: usize) -> &Lane {
         self.lanes[lane].as_ref().unwrap_or_else(|| no_lane(lane))
     }
 
-    fn lane_mut(&mut self, lane: usize) -> &mut Lane {
+    pub(super) fn lane_mut(&mut self, lane: usize) -> &mut Lane {
         self.lanes[lane].as_mut().unwrap_or_else(|| no_lane(lane))
     }
 
@@ -162,6 +168,7 @@ impl VulkanLanes {
         (lane.standing, lane.objective) = (standing, standing.objective);
         (lane.wanted, lane.iterations, lane.has_old_depths) = (0, 0, false);
         (lane.has_failed, lane.failure) = (false, None);
+        lane.has_old_pixels = false;
         Ok(())
     }
 
@@ -195,7 +202,7 @@ impl VulkanLanes {
     }
 
     /// Writes the beginning of a lane's slice.
-    fn write(&mut self, number: usize, part: Part, bytes: &[u8]) -> Result<()> {
+    pub(super) fn write(&mut self, number: usize, part: Part, bytes: &[u8]) -> Result<()> {
         let BufferRange { buffer, offset, size_bytes } = self.range(number, part);
         if bytes.len() as u64 > size_bytes {
             return Err(Error::Internal(format!("{} bytes for the {size_bytes} of {part:?} of a lane", bytes.len())));
@@ -238,7 +245,7 @@ impl VulkanLanes {
             teams.push(Team { variant, group: kin.buffers.bind(self.pass.any_pipeline())?, lanes: team });
         }
         self.pass.arrange(&teams)?;
-        self.is_arranged = true;
+        (self.is_arranged, self.next_cell) = (true, 0);
         Ok(())
     }
 
@@ -250,7 +257,10 @@ impl VulkanLanes {
             lane.iterations.div_ceil(lane.standing.rounds.max(1)).max(1).saturating_mul(left)
         };
         let most = match self.device.info().kind {
-            DeviceKind::Cpu => (ITERATIONS_MAX / busy.len().max(1) as u32).max(1),
+            DeviceKind::Cpu => {
+                let cells: u32 = busy.iter().map(|&number| self.lane(number).plan.cell_count).sum();
+                (ITERATIONS_MAX / busy.len().max(1) as u32).min(CELLS_MAX / cells.max(1)).max(1)
+            }
             _ => ITERATIONS_MAX,
         };
         busy.iter().map(|&number| needed(self.lane(number))).min().unwrap_or(1).clamp(1, most)
@@ -273,18 +283,26 @@ impl VulkanLanes {
             }
         }
         self.pass.record_depths(&mut self.recorder, &with_old_depths)?;
+        self.keep_marks(busy)?;
+        let (cells, lanes) = self.pass.cells();
+        if self.device.info().kind == DeviceKind::Cpu && cells * lanes > CELLS_MAX {
+            let first = self.next_cell;
+            let end = (first + (CELLS_MAX / lanes).max(1)).min(cells);
+            self.next_cell = if end == cells { 0 } else { end };
+            return self.pass.record_part(&mut self.recorder, first..end);
+        }
         let iterations = self.iterations(busy);
         self.pass.record(&mut self.recorder, iterations)
     }
 
-    fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
+    pub(super) fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
         let tickets = lanes.iter().map(|&lane| self.ask_for(lane, Part::Flies)).collect::<Result<Vec<_>>>()?;
         self.recorder.submit_and_wait()?;
         tickets.iter().map(|ticket| self.take(ticket)).collect()
     }
 }
 
-fn no_lane(lane: usize) -> ! {
+pub(super) fn no_lane(lane: usize) -> ! {
     panic!("lane {lane} was never admitted, or was dismissed")
 }
 
@@ -318,7 +336,22 @@ impl SearchLanes for VulkanLanes {
         self.begin(lane, Some(flies))
     }
 
+    fn mark(&mut self, lane: usize) -> Result<()> {
+        self.mark_lane(lane)
+    }
+
+    fn cut(&mut self, lane: usize) -> Result<()> {
+        self.take_back(lane)
+    }
+
+    fn rounds_between_marks(&self) -> u32 {
+        if self.device.info().kind == DeviceKind::Cpu { 1 } else { u32::MAX }
+    }
+
     fn ask(&mut self, lane: usize, rounds: u32) -> Result<()> {
+        if self.lane(lane).has_old_pixels {
+            self.lay_again(lane)?;
+        }
         let Lane { wanted, has_failed, .. } = self.lane_mut(lane);
         if *has_failed {
             return Err(Error::Internal(format!("lane {lane} failed before and is asked for more")));
@@ -348,6 +381,9 @@ impl SearchLanes for VulkanLanes {
         for (number, ticket) in busy.into_iter().zip(tickets) {
             let header = self.take::<SearchHeader>(&ticket)?[0];
             self.lane_mut(number).absorb(&header);
+        }
+        if !self.lanes.iter().flatten().any(Lane::is_busy) {
+            self.next_cell = 0;
         }
         Ok(())
     }
@@ -384,6 +420,9 @@ impl SearchLanes for VulkanLanes {
     }
 
     fn read_back_stacks(&mut self, lane: usize) -> Result<Stacks> {
+        if self.lane(lane).has_old_pixels {
+            return self.twin(lane)?.0.read_back_stacks();
+        }
         let (pixels, stacks) = (self.ask_for(lane, Part::Pixels)?, self.ask_for(lane, Part::Stacks)?);
         self.recorder.submit_and_wait()?;
         let (pixels, words): (Vec<u32>, Vec<u32>) = (self.take(&pixels)?, self.take(&stacks)?);

@@ -5,6 +5,7 @@
 //! lane does not need returns at once. Lanes of another variant have other buffers, so their dispatches need not wait
 //! for these.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::layout::CellsPush;
@@ -99,15 +100,27 @@ struct Dispatch {
     workgroups: u32,
 }
 
+/// When in an iteration a stage has its turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Turn {
+    /// Before the cells.
+    Dealing,
+    /// A workgroup is a cell.
+    Cells,
+    /// After a round.
+    Fitness,
+}
+
 /// Dispatches that need not wait for each other, under the stem of their shader.
 struct Stage {
     name: &'static str,
+    turn: Turn,
     dispatches: Vec<Dispatch>,
 }
 
 impl Stage {
-    fn new(name: &'static str) -> Self {
-        Self { name, dispatches: Vec::new() }
+    fn new(name: &'static str, turn: Turn) -> Self {
+        Self { name, turn, dispatches: Vec::new() }
     }
 
     /// Adds a dispatch for all lanes of a team, with the most workgroups that one of them needs.
@@ -179,9 +192,14 @@ impl CellsPass {
     /// Prepares the stages for these lanes.
     pub fn arrange(&mut self, teams: &[Team]) -> Result<()> {
         const STEMS: [&str; 4] = ["cells_deal", "cells_scan", "cells_scatter", "cells_sort"];
-        let mut stages: Vec<Stage> = STEMS.map(Stage::new).into();
-        const STEPS: [&str; 4] = ["cells", "cells_glazed", "cells_fitness", "cells_fitness"];
-        let mut steps = STEPS.map(Stage::new);
+        let mut stages: Vec<Stage> = STEMS.map(|stem| Stage::new(stem, Turn::Dealing)).into();
+        const STEPS: [(&str, Turn); 4] = [
+            ("cells", Turn::Cells),
+            ("cells_glazed", Turn::Cells),
+            ("cells_fitness", Turn::Fitness),
+            ("cells_fitness", Turn::Fitness),
+        ];
+        let mut steps = STEPS.map(|(stem, turn)| Stage::new(stem, turn));
         for team in teams {
             let flies = team.most(|lane| lane.fly_count.div_ceil(ITEMS_PER_GROUP));
             let pixels = team.most(|lane| lane.block_count);
@@ -242,6 +260,46 @@ impl CellsPass {
             }
         }
         Ok(())
+    }
+
+    /// The most cells of a lane in a round, and how many lanes there are.
+    pub fn cells(&self) -> (u32, u32) {
+        let steps = self.stages.iter().filter(|stage| stage.turn == Turn::Cells).flat_map(|stage| &stage.dispatches);
+        steps.fold((0, 0), |(cells, lanes), step| (cells.max(step.workgroups), lanes + step.lanes))
+    }
+
+    /// Records a part of an iteration: it takes these cells of each lane as far as the budget allows. A round begins
+    /// with the part of the first cell.
+    pub fn record_part(&self, recorder: &mut Recorder, cells: Range<u32>) -> Result<()> {
+        for stage in self.stages.iter().filter(|stage| stage.turn != Turn::Dealing || cells.start == 0) {
+            let mut pass = recorder.compute_pass(stage.name)?;
+            for dispatch in &stage.dispatches {
+                if stage.turn == Turn::Cells {
+                    self.dispatch_part(&mut pass, dispatch, &cells);
+                } else {
+                    self.dispatch(&mut pass, dispatch);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// As [`CellsPass::dispatch`], for some workgroups of each lane.
+    fn dispatch_part(&self, pass: &mut ComputePass<'_>, dispatch: &Dispatch, part: &Range<u32>) {
+        let columns = dispatch.workgroups.min(self.device.info().limits.workgroups[0]);
+        if columns < dispatch.workgroups {
+            // Shaders number workgroups by rows, of which a part would have shorter ones. So many cells are rare.
+            if part.start == 0 {
+                self.dispatch(pass, dispatch);
+            }
+            return;
+        }
+        let end = part.end.min(dispatch.workgroups);
+        if part.start < end {
+            pass.bind(&dispatch.pipeline, &dispatch.group);
+            pass.push_constants(bytemuck::bytes_of(&dispatch.push));
+            pass.dispatch_part(part.start, end - part.start, dispatch.lanes);
+        }
     }
 
     fn dispatch(&self, pass: &mut ComputePass<'_>, dispatch: &Dispatch) {

@@ -7,7 +7,7 @@ use super::shape::CellShape;
 use super::state;
 use crate::error::{Error, Result};
 use crate::model::Fly;
-use crate::model::cells::{Course, OneLane, Search, SearchLanes, SearchState, Stacks, Standing};
+use crate::model::cells::{Ask, Course, OneLane, Search, SearchLanes, SearchState, Stacks, Standing};
 use crate::vk::{Device, Timing};
 
 /// A search on a Vulkan device.
@@ -54,6 +54,10 @@ impl Search for VulkanSearch {
 
     fn advance(&mut self, rounds: u32) -> Result<()> {
         self.only().advance(rounds)
+    }
+
+    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
+        self.only().advance_until(rounds, is_over)
     }
 
     fn renormalise(&mut self) -> Result<()> {

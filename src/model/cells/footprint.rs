@@ -75,6 +75,13 @@ impl Footprint {
         self.x0 > self.x1
     }
 
+    /// Pixels of the box.
+    #[inline]
+    #[must_use]
+    pub fn area_px(&self) -> u32 {
+        ((self.x1 - self.x0 + 1) * (self.y1 - self.y0 + 1)) as u32
+    }
+
     /// Tile coordinates of a pixel, exact inside the box and up to eight pixels around it.
     #[inline(always)]
     #[must_use]

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
+use super::glaze::opacity_of;
 use super::rules::Rules;
 use crate::error::{Error, Result};
-use crate::model::{Blend, Fly, Guide, MaskSet, Target};
+use crate::model::tile::unpack;
+use crate::model::translucency::Compositing;
+use crate::model::{Blend, Fly, Guide, MaskSet, Rgb, Target};
 
 /// What stays the same while a picture is searched.
 #[derive(Clone, Debug)]
@@ -77,6 +80,37 @@ pub struct Stacks {
     pub pixels: Vec<Vec<(u32, i32)>>,
 }
 
+impl Stacks {
+    /// The SAE of the mosaic of these stacks, over all wanted pixels, without weights.
+    #[must_use]
+    pub fn sae(&self, Course { target, rules, masks, .. }: &Course) -> u64 {
+        let ground = unpack(rules.background);
+        let is_translucent = masks.blend() == Blend::Translucent;
+        let error = |(pixel, stack): (usize, &Vec<(u32, i32)>)| {
+            if target.transparent().is_some_and(|transparent| transparent[pixel]) {
+                return 0;
+            }
+            if is_translucent {
+                let mut compositing = Compositing::START;
+                stack.iter().for_each(|&(_, look)| compositing.add(opacity_of(look as u32), unpack(look as u32)));
+                return difference(target.pixels()[pixel], compositing.over(ground));
+            }
+            let weight = target.weights().map_or(1, |weights| u64::from(weights[pixel]));
+            stack
+                .first()
+                .map_or_else(|| difference(target.pixels()[pixel], ground), |&(_, error)| error as u64 / weight)
+        };
+        self.pixels.iter().enumerate().map(error).sum()
+    }
+}
+
+fn difference(one: Rgb, other: Rgb) -> u64 {
+    one.iter().zip(other).map(|(&a, b)| u64::from(a.abs_diff(b))).sum()
+}
+
+/// Asks whether a search is to be cut short: many times in a round, and from any thread.
+pub type Ask<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// Searches one picture, round by round. Every implementation reaches the same state after every round.
 pub trait Search: Send {
     /// What stays the same.
@@ -93,7 +127,17 @@ pub trait Search: Send {
     ///
     /// # Errors
     /// If the device fails.
-    fn advance(&mut self, rounds: u32) -> Result<()>;
+    fn advance(&mut self, rounds: u32) -> Result<()> {
+        self.advance_until(rounds, &|| false).map(|_| ())
+    }
+
+    /// Makes some rounds, or fewer if `is_over` says so in the middle of one. Then the search is where a round ended,
+    /// as if that one had never begun, and this returns false. Which of these rounds it was may differ from device to
+    /// device.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool>;
 
     /// Spreads the depths evenly over their range, in the same order: the picture stays as it is.
     ///
@@ -109,6 +153,15 @@ pub trait Search: Send {
     /// # Errors
     /// If the device fails.
     fn read_back(&mut self) -> Result<SearchState>;
+
+    /// The SAE of the current mosaic, over all wanted pixels, without weights.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn sae(&mut self) -> Result<u64> {
+        let stacks = self.read_back_stacks()?;
+        Ok(stacks.sae(self.course()))
+    }
 
     /// The flies on every pixel.
     ///
@@ -144,6 +197,21 @@ pub trait SearchLanes: Send {
     /// # Errors
     /// If the device fails.
     fn load(&mut self, lane: usize, flies: &[Fly]) -> Result<()>;
+
+    /// Marks where a lane is that is not busy, so that [`SearchLanes::cut`] can take it back there.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn mark(&mut self, lane: usize) -> Result<()>;
+
+    /// Takes a lane back to where it was marked; it is not busy then.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn cut(&mut self, lane: usize) -> Result<()>;
+
+    /// Most rounds to ask for at once if they may be cut short: where a round is long, no more than one should be lost.
+    fn rounds_between_marks(&self) -> u32;
 
     /// Asks for `rounds` more rounds.
     ///
@@ -207,6 +275,27 @@ impl Search for OneLane<'_> {
             self.lanes.work()?;
         }
         self.lanes.failure(self.lane).map_or(Ok(()), Err)
+    }
+
+    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
+        let mut left = rounds;
+        while left > 0 {
+            let asked = left.min(self.lanes.rounds_between_marks());
+            self.lanes.mark(self.lane)?;
+            self.lanes.ask(self.lane, asked)?;
+            while self.lanes.is_busy(self.lane) {
+                if is_over() {
+                    self.lanes.cut(self.lane)?;
+                    return Ok(false);
+                }
+                self.lanes.work()?;
+            }
+            if let Some(error) = self.lanes.failure(self.lane) {
+                return Err(error);
+            }
+            left -= asked;
+        }
+        Ok(true)
     }
 
     fn renormalise(&mut self) -> Result<()> {

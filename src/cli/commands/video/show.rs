@@ -12,7 +12,7 @@ use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::{Progress, Stage};
 use crate::cli::terminal::{self, words};
 use crate::error::Result;
-use crate::evolve::{Observer, Seen, StopReason};
+use crate::evolve::{Brake, Observer, Seen, StopReason};
 
 /// The result of a frame.
 #[derive(Debug, Serialize)]
@@ -109,6 +109,10 @@ impl<'a> Watcher<'a> {
 }
 
 impl Observer for Watcher<'_> {
+    fn brake(&self) -> Brake {
+        self.interrupt.brake()
+    }
+
     fn after_epoch(&mut self, seen: &mut Seen<'_>) -> Result<Option<StopReason>> {
         if self.interrupt.is_requested() {
             return Ok(Some(StopReason::Interrupted));
