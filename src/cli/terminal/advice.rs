@@ -37,7 +37,7 @@ pub(crate) fn why_no_vulkan(error: &Error) -> String {
 }
 
 /// The exit code of the process: 1 failed; 2 usage, configuration or unreadable input; 4 no suitable device; 75 device
-/// lost or interrupted, run again (README, "Exit codes").
+/// lost or interrupted, run again (docs/reference.md, "Exit codes").
 pub(crate) fn exit_code(error: &Error) -> u8 {
     match error {
         Error::Usage(_)
