@@ -3,8 +3,8 @@
 //!
 //! Nothing here names a flag of the command line or an exit code. The command line adds the flags that help.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
+use std::{fmt, io};
 
 /// Result of everything in the crate that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -239,6 +239,54 @@ impl Error {
     }
 }
 
+/// What the system refused, in plain words, as a clause after "since" or in brackets. What it says itself is for
+/// programmers: "Not a directory (os error 20)".
+pub(crate) fn in_words(error: &io::Error) -> String {
+    use io::ErrorKind as Kind;
+    let words = match error.kind() {
+        Kind::NotFound => "there is nothing of this name",
+        Kind::NotADirectory => "a part of the path is a file, not a folder",
+        Kind::IsADirectory => "it is a folder",
+        Kind::PermissionDenied => "its permissions forbid it",
+        Kind::AlreadyExists => "a file of this name is there already",
+        Kind::DirectoryNotEmpty => "the folder is not empty",
+        Kind::StorageFull => "the disk is full",
+        Kind::QuotaExceeded => "your share of the disk is full",
+        Kind::ReadOnlyFilesystem => "the disk can only be read",
+        Kind::FileTooLarge => "a file may not be as large here",
+        Kind::TooManyLinks => "the file has too many links",
+        Kind::InvalidFilename => "the name is too long or has characters that are not allowed",
+        Kind::CrossesDevices => "the two places are on different disks",
+        Kind::ResourceBusy | Kind::ExecutableFileBusy | Kind::WouldBlock => "it is in use",
+        Kind::BrokenPipe => "the reader went away",
+        Kind::UnexpectedEof => "the file ends too early",
+        Kind::OutOfMemory => "no memory is left",
+        Kind::TimedOut => "it took too long",
+        Kind::StaleNetworkFileHandle | Kind::HostUnreachable | Kind::NetworkUnreachable | Kind::NetworkDown => {
+            "the network disk is gone"
+        }
+        _ => return told_by_system(error),
+    };
+    words.to_owned()
+}
+
+/// The system's own words for what has no kind of its own, without the number that it appends.
+fn told_by_system(error: &io::Error) -> String {
+    #[cfg(unix)]
+    match error.raw_os_error() {
+        Some(5) => return "the disk or its connection has a fault".to_owned(),
+        Some(23 | 24) => return "too many files are open at once".to_owned(),
+        Some(40) => return "its links lead in a circle".to_owned(),
+        _ => {}
+    }
+    let told = error.to_string();
+    let told = told.split(" (os error").next().unwrap_or_default();
+    let mut letters = told.chars();
+    letters
+        .next()
+        .map_or_else(|| "no reason was given".to_owned(), |first| first.to_lowercase().chain(letters).collect())
+}
+
 fn unlisted(request: &str, devices: &[String]) -> String {
     if devices.is_empty() {
         return format!("`{request}` was asked for and Vulkan lists no device");
@@ -255,5 +303,15 @@ mod tests {
         fn is_error<T: std::error::Error + Send + Sync + 'static>() {}
         is_error::<Error>();
         is_error::<NoDevice>();
+    }
+
+    #[test]
+    fn no_reason_of_the_system_is_told_by_its_number() {
+        for number in 1..140 {
+            let words = in_words(&io::Error::from_raw_os_error(number));
+            assert!(!words.contains("os error") && !words.is_empty(), "{number}: {words}");
+        }
+        let words = in_words(&io::Error::other("It fell."));
+        assert_eq!(words, "it fell.");
     }
 }

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuilder};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 
 /// How often it is tried to start a thread, and the time between two tries. A thread that has just ended still counts
 /// for a moment.
@@ -133,7 +133,9 @@ fn try_one() -> Result<()> {
 }
 
 fn refused(error: &io::Error) -> Error {
-    Error::Threads { reason: error.to_string() }
+    // What the system says then: "Resource temporarily unavailable".
+    let at_limit = error.kind() == io::ErrorKind::WouldBlock;
+    Error::Threads { reason: if at_limit { "their limit is reached".to_owned() } else { in_words(error) } }
 }
 
 /// The error where not one thread of several could be started.

@@ -17,7 +17,7 @@ use serde_json::{Map, Value};
 use crate::model::{Blend, Grout, Population, Rgb};
 
 pub use encode::{encode, encode_snapshot};
-pub use read::{decode, is_cut_short, read, read_meta};
+pub use read::{IS_A_PICTURE, decode, is_cut_short, read, read_meta};
 pub use table::{
     KEY_DIGITS, encode_csv, encode_json, is_csv_without_rows, is_whole_csv, read_csv_meta, read_json_meta,
 };

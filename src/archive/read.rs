@@ -11,7 +11,7 @@ use zip::result::ZipError;
 
 use super::array_header::{self, ARRAY_HEADER_BYTES_MAX};
 use super::{Archive, GENE_COLUMNS, GroutEntry, HEADER_MEMBER, Header, SCHEMA};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::guard;
 use crate::model::fly::{Genes, SIDE_MAX, SIDE_MIN, UNITS_PER_PX};
 use crate::model::grout::GROUT_WIDTH_MAX;
@@ -19,10 +19,14 @@ use crate::model::mask::{MASK_LAYERS_MAX, MASK_SIDE, Texel};
 use crate::model::population::FLY_COUNT_MAX;
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Backdrop, Fly, Mask, MaskSet, Population};
-use crate::photo;
+use crate::photo::{self, Kind};
 
 /// Most bytes of a column: eight per fly and an array header.
 const COLUMN_BYTES_MAX: u64 = 8 * FLY_COUNT_MAX as u64 + ARRAY_HEADER_BYTES_MAX as u64 + 16;
+/// Bytes at the beginning of a file that tell a picture.
+const HEAD_BYTES: u64 = 64;
+/// The refusal of a picture, which people give where its population is meant.
+pub const IS_A_PICTURE: &str = "is a picture, which holds no population; name the .npz file of its population";
 /// Most bytes that are taken from a pipe.
 const PIPE_BYTES_MAX: u64 = 1 << 30;
 /// Most bytes of `meta.json`.
@@ -162,10 +166,16 @@ fn spooled(pipe: File) -> io::Result<File> {
 }
 
 impl<R: Read + Seek> Members<R> {
-    fn of(file: R) -> Result<Self, String> {
-        let zip =
-            ZipArchive::new(file).map_err(|error| format!("is not a population: no readable .npz file ({error})"))?;
-        Ok(Self { zip })
+    fn of(mut file: R) -> Result<Self, String> {
+        let unreadable = |error: io::Error| photo::why_unreadable(&error);
+        let mut head = Vec::new();
+        file.by_ref().take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
+        file.rewind().map_err(unreadable)?;
+        if matches!(photo::kind_of(&head), Kind::Read(_)) {
+            return Err(IS_A_PICTURE.to_owned());
+        }
+        let wrong = |_| "is not a population: it is no .npz file, or is cut short; get the file again".to_owned();
+        ZipArchive::new(file).map(|zip| Self { zip }).map_err(wrong)
     }
 
     fn has(&self, array: &str) -> bool {
@@ -176,13 +186,14 @@ impl<R: Read + Seek> Members<R> {
     fn bytes(&mut self, member: &str, bytes_max: u64) -> Result<Vec<u8>, String> {
         let member_file = self.zip.by_name(member).map_err(|error| match error {
             ZipError::FileNotFound => format!("is not a population: it has no `{member}`"),
-            error => format!("its `{member}` cannot be read ({error})"),
+            ZipError::Io(error) => format!("its `{member}` cannot be read, since {}", in_words(&error)),
+            _ => format!("its `{member}` is packed in a way that is not read, or is broken; get the file again"),
         })?;
         let mut bytes = Vec::new();
         member_file
             .take(bytes_max + 1)
             .read_to_end(&mut bytes)
-            .map_err(|error| format!("its `{member}` is broken ({error}); get the file again"))?;
+            .map_err(|_| format!("its `{member}` is broken; get the file again"))?;
         if bytes.len() as u64 > bytes_max {
             return Err(format!("its `{member}` is larger than the limit of {bytes_max} bytes"));
         }
@@ -268,7 +279,7 @@ impl<R: Read + Seek> Members<R> {
             return Err(format!("its `{name}` is not {side}x{side}x2 in C order"));
         }
         let values: Vec<u8> =
-            array.into_vec().map_err(|error| format!("its `{name}` is not of type u8 or is cut short ({error})"))?;
+            array.into_vec().map_err(|_| format!("its `{name}` is not of type u8, or is cut short"))?;
         let texels = values.as_chunks::<2>().0.iter().map(|&[coverage, shade]| Texel { coverage, shade }).collect();
         Mask::new(texels).map_err(|error| error.to_string())
     }
@@ -281,7 +292,7 @@ impl<R: Read + Seek> Members<R> {
 /// The array in a member, with its header parsed.
 fn array<'a>(name: &str, bytes: &'a [u8]) -> Result<NpyFile<&'a [u8]>, String> {
     array_header::check(bytes).map_err(|reason| format!("its `{name}` {reason}"))?;
-    NpyFile::new(bytes).map_err(|error| format!("its `{name}` is not an array of numpy ({error})"))
+    NpyFile::new(bytes).map_err(|_| format!("its `{name}` is not an array of numpy"))
 }
 
 fn column_of<T: Deserialize>(name: &str, bytes: &[u8], type_name: &str) -> Result<Vec<T>, String> {
@@ -295,7 +306,5 @@ fn column_of<T: Deserialize>(name: &str, bytes: &[u8], type_name: &str) -> Resul
     let descr = array.dtype().descr();
     let wrong_type = || format!("its column `{name}` is of type {descr} instead of {type_name}");
     let values = array.data::<T>().map_err(|_| wrong_type())?;
-    values
-        .collect::<io::Result<Vec<T>>>()
-        .map_err(|error| format!("its column `{name}` is broken or cut short ({error})"))
+    values.collect::<io::Result<Vec<T>>>().map_err(|_| format!("its column `{name}` is broken or cut short"))
 }

@@ -23,8 +23,19 @@ use crate::cli::commands::timelapse::TimelapseArgs;
 use crate::cli::commands::video::VideoArgs;
 use crate::cli::list::{self, BatchArgs};
 use crate::cli::terminal::{self, advice, interrupt};
-use crate::cli::{commands, config};
+use crate::cli::{commands, config, help, hints};
 use crate::error::Result;
+
+const AFTER_HELP: &str = "\
+Begin with: smalti evolve photo.jpg -o mosaic.png --style mosaic
+
+smalti evolve -h shows the most used flags of a command, and smalti evolve --help explains all of them.";
+
+const AFTER_LONG_HELP: &str = "\
+Begin with: smalti evolve photo.jpg -o mosaic.png --style mosaic
+
+Exit codes: 0 done; 1 failed; 2 wrong usage or unreadable input; 3 some items failed; 4 no suitable device; 75 interrupted, or the \
+device was lost (run the same command again); 130 second Ctrl-C.";
 
 /// Evolves pictures into mosaics of thousands of tiles.
 #[derive(Debug, Parser)]
@@ -32,15 +43,15 @@ use crate::error::Result;
     name = "smalti",
     version,
     about = "Evolves pictures into mosaics of thousands of tiles.",
-    after_help = "Exit codes: 0 done, 1 failed, 2 wrong usage or unreadable input, 3 some items failed,\n\
-                  4 no suitable device, 75 interrupted or device lost (run the same command again), 130 second Ctrl-C."
+    after_help = AFTER_HELP,
+    after_long_help = AFTER_LONG_HELP
 )]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     command: Command,
-    /// Flags in a TOML file; the command line overrides it
-    #[arg(long, global = true, value_name = "FILE", env = "SMALTI_CONFIG", help_heading = "Options")]
+    /// TOML file of flags; what is typed overrides it
+    #[arg(long, global = true, value_name = "FILE", env = "SMALTI_CONFIG", hide_env_values = true)]
     config: Option<PathBuf>,
     /// What was typed, and what the file of `--config` added to it.
     #[arg(skip)]
@@ -53,13 +64,15 @@ impl Cli {
     /// # Errors
     /// The exit code to end with: 0 after help or version, 2 after a wrong command line.
     pub fn from_command_line() -> Result<Self, ExitCode> {
-        let parsed = Self::parsed(std::env::args_os().collect()).map_err(|error| {
+        let (built, typed) = known(std::env::args_os().collect());
+        let tokens = config::expand(typed, &built).map_err(|error| {
             terminal::error(&advice::sentence(&error));
             ExitCode::from(advice::exit_code(&error))
         })?;
-        parsed.map_err(|error| {
+        Self::parsed(&tokens).map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
-                terminal::error(&one_sentence(&error.to_string(), &command_typed()));
+                let hint = hints::of(&error, &tokens, &built);
+                terminal::error(&hint.unwrap_or_else(|| one_sentence(&error.to_string(), &command_typed())));
             } else {
                 // Only a closed pipe can fail here: nobody wants the rest of the help.
                 let _ = error.print();
@@ -69,20 +82,10 @@ impl Cli {
     }
 
     /// The command line of these tokens, of which the first names the program; nothing is printed.
-    ///
-    /// # Errors
-    /// About the file of `--config`; within, about the tokens.
-    fn parsed(typed: Vec<OsString>) -> Result<Result<Self, clap::Error>> {
-        let mut definition = Self::command();
-        definition.build();
-        advice::know_flags(&definition);
-        let tokens = config::expand(typed, &definition)?;
-        let parse = || {
-            let matches = Self::command().try_get_matches_from(&tokens)?;
-            let cli = Self::from_arg_matches(&matches)?;
-            Ok(Self { typed: Typed { tokens: tokens.clone(), matches, definition: Self::command() }, ..cli })
-        };
-        Ok(parse())
+    fn parsed(tokens: &[OsString]) -> Result<Self, clap::Error> {
+        let matches = definition().try_get_matches_from(tokens)?;
+        let cli = Self::from_arg_matches(&matches)?;
+        Ok(Self { typed: Typed { tokens: tokens.to_vec(), matches, definition: definition() }, ..cli })
     }
 
     /// Checks the command line of these tokens as far as is possible before the first picture is read, and does
@@ -92,15 +95,29 @@ impl Cli {
     /// The sentence that the user would see.
     #[doc(hidden)]
     pub fn checked(typed: Vec<OsString>) -> Result<usize, String> {
-        let cli = Self::parsed(typed)
-            .map_err(|error| advice::sentence(&error))?
-            .map_err(|error| one_sentence(&error.to_string(), "smalti"))?;
+        let (built, typed) = known(typed);
+        let tokens = config::expand(typed, &built).map_err(|error| advice::sentence(&error))?;
+        let cli = Self::parsed(&tokens).map_err(|error| one_sentence(&error.to_string(), "smalti"))?;
         match &cli.command {
             Command::Batch(args) => list::find(args, &cli.typed).map(|items| items.len()),
             _ => Ok(0),
         }
         .map_err(|error| advice::sentence(&error))
     }
+}
+
+/// The command line with everything that it may say, and what was typed with the command that it lacks.
+fn known(typed: Vec<OsString>) -> (clap::Command, Vec<OsString>) {
+    let mut built = definition();
+    built.build();
+    advice::know_flags(&built);
+    let typed = hints::with_command(typed, &built);
+    (built, typed)
+}
+
+/// All commands and flags, with their help arranged.
+fn definition() -> clap::Command {
+    help::arranged(Cli::command())
 }
 
 /// Does what the command line asks for; the exit code of the process.
@@ -123,8 +140,8 @@ pub fn run(cli: &Cli) -> ExitCode {
         Command::Merge(args) => commands::merge::merge(args),
         Command::Video(args) => commands::video::make(args),
         Command::Bench(args) => commands::bench::bench(args),
-        Command::Completions(args) => commands::manual::completions(args, Cli::command()),
-        Command::Man(args) => commands::manual::man(args, Cli::command()),
+        Command::Completions(args) => commands::manual::completions(args, definition()),
+        Command::Man(args) => commands::manual::man(args, definition()),
     }
 }
 
@@ -139,35 +156,37 @@ fn command_typed() -> String {
 enum Command {
     /// Evolve one picture into a mosaic
     ///
-    /// Thousands of coloured tiles are bred, child by child, until together they look like the picture. The same
-    /// picture, options and seed give the same bytes on every device.
+    /// Thousands of coloured tiles change step by step, until together they look like the picture. The same picture,
+    /// options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
-    /// Evolve many pictures, and go on where it was interrupted
+    /// Evolve many pictures
     ///
-    /// One bad picture never stops the others: the reason is in its line of the results, and the exit code is 3.
+    /// If it is interrupted, the same command goes on from there. A bad picture does not stop the others: its line in the
+    /// results tells what is wrong, and the exit code is 3.
     Batch(Box<BatchArgs>),
-    /// Evolve a sequence of pictures into mosaics whose tiles move instead of flickering
+    /// Evolve a video into a moving mosaic that does not flicker
     ///
-    /// Each frame begins with the tiles of the one before, and what holds still in the pictures holds still in the
-    /// mosaics. The same command goes on where it was ended.
+    /// Each frame begins with the tiles of the frame before it, so what holds still in the video holds still in the mosaic.
+    /// If it is interrupted, the same command goes on from there.
     Video(Box<VideoArgs>),
-    /// Draw a population again, at any size, or write it in another format
+    /// Draw saved tiles again, at any size or in another format
     ///
-    /// At the size at which it evolved the picture is the one that `evolve` wrote.
+    /// The tiles come from a .npz file that `smalti evolve` wrote. At the size at which they evolved, the picture is the same
+    /// one that `smalti evolve` draws.
     Render(Box<RenderArgs>),
     /// Make the figures and tables of the paper from your own pictures
     ///
-    /// Each is a page with its pictures, plots and tables, to be opened from disk.
+    /// Each is a page with its pictures, plots and tables, to be opened in a browser.
     Paper(PaperArgs),
     /// Show every mask and every shader on the same pictures
     Gallery(GalleryArgs),
-    /// Turn the snapshots of an evolution into an animation
+    /// Make an animation of how a mosaic evolved
     ///
-    /// Draws what `smalti evolve --save-run DIR` kept, in order and at any size.
+    /// It is drawn, at any size, from the snapshots that `smalti evolve --save-run DIR` kept.
     Timelapse(Box<TimelapseArgs>),
-    /// List the Vulkan devices of this machine, and which one would be taken
+    /// List the Vulkan devices of this machine
     Devices(DevicesArgs),
-    /// Measure how much pictures are like a reference
+    /// Measure how close pictures come to a reference
     ///
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed
     /// with numpy, scipy and scikit-image. Of an animation the first frame is measured.
@@ -176,9 +195,11 @@ enum Command {
     ///
     /// Reads what smalti wrote into its pictures, animations and populations.
     Show(ShowArgs),
-    /// Cut a batch into shards, with scripts that run them on Slurm, Kubernetes, or GNU parallel
+    /// Prepare a batch for a cluster: Slurm, Kubernetes, or GNU parallel
+    ///
+    /// The batch is cut into shards, and scripts are written that run them.
     Plan(Box<PlanArgs>),
-    /// Put the results of several shards or runs together
+    /// Put the results of several batches or shards together
     ///
     /// Tells which pictures failed, and which are missing.
     Merge(MergeArgs),
@@ -196,6 +217,6 @@ mod tests {
 
     #[test]
     fn the_definition_of_the_command_line_is_consistent() {
-        Cli::command().debug_assert();
+        definition().debug_assert();
     }
 }

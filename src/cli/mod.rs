@@ -1,7 +1,7 @@
 //! The command line, which lies on top of the library: flags, files, messages and exit codes.
 //!
 //! ```text
-//! command_line   all commands and their help
+//! command_line   all commands; help: how it is arranged; hints: what is said to wrong ones
 //!   commands     one module for each command; they do not know each other
 //!     list       pictures of a batch        film     animations        mosaics   many mosaics of the paper
 //!       jobs     one picture at work: read, evolved, drawn, and what is told of it
@@ -21,6 +21,8 @@ mod commands;
 mod config;
 mod files;
 mod film;
+mod help;
+mod hints;
 mod jobs;
 mod list;
 mod mosaics;

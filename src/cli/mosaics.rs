@@ -35,7 +35,7 @@ pub(crate) struct MosaicsArgs {
     /// Number that decides every random choice
     #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0)]
     pub seed: u64,
-    /// Write into a folder that holds other files, too
+    /// Write into the folder even if it holds other files
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]

@@ -34,15 +34,34 @@ pub(crate) fn side_px(flag: &str, px: u64) -> Result<u32> {
     in_range(flag, px, 1..=u64::from(TARGET_SIDE_MAX_PX)).map(|px| px as u32)
 }
 
-/// A whole number, as `40000`, `40k` or `2M`.
+/// A whole number, as `40000`, `40_000`, `40k`, `2.5k` or `2M`.
 pub(crate) fn count(text: &str) -> Result<u64, String> {
-    let (digits, factor) = match text.strip_suffix(['k', 'K']) {
-        Some(digits) => (digits, 1_000),
-        None => text.strip_suffix('M').map_or((text, 1), |digits| (digits, 1_000_000)),
+    let (digits, zeros) = match text.strip_suffix(['k', 'K']) {
+        Some(digits) => (digits, 3),
+        None => text.strip_suffix('M').map_or((text, 0), |digits| (digits, 6)),
     };
-    whole(digits)
-        .and_then(|number| number.checked_mul(factor))
-        .ok_or_else(|| "expected a whole number such as 500, 40k or 2M".to_owned())
+    decimal(digits, zeros).ok_or_else(|| {
+        // A small m is a thousandth elsewhere, or minutes.
+        let is_small_m = text.strip_suffix('m').is_some_and(|digits| decimal(digits, 6).is_some());
+        if is_small_m {
+            let million = text.to_uppercase();
+            return format!("expected a whole number such as 500, 40k or 2M; for millions write {million}");
+        }
+        "expected a whole number such as 500, 40k or 2M".to_owned()
+    })
+}
+
+/// The number that is written with or without decimals, times ten to the power of `zeros`, if that is whole. Single `_`
+/// may part digits.
+fn decimal(text: &str, zeros: u32) -> Option<u64> {
+    let (before, after) = text.split_once('.').map_or((text, ""), |(before, after)| (before, after));
+    let has_point = text.contains('.');
+    let is_parted_well = before.split('_').all(|part| !part.is_empty());
+    if !is_parted_well || (has_point && after.is_empty()) || after.len() > zeros as usize {
+        return None;
+    }
+    let digits = format!("{}{after}", before.replace('_', ""));
+    whole(&digits)?.checked_mul(10_u64.pow(zeros - after.len() as u32))
 }
 
 /// A word, quoted for a shell.
@@ -80,31 +99,52 @@ pub(crate) fn seed(text: &str) -> Result<u64, String> {
     whole(text).ok_or_else(|| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
-/// A duration: seconds, or numbers with the units h, m, s and ms, as `90`, `30s`, `1h30m`.
+/// A duration: seconds, or numbers with units, as `90`, `30s`, `1.5m`, `1min` or `1h30m`.
 pub(crate) fn duration(text: &str) -> Result<Duration, String> {
     let wrong = || "expected a time such as 90, 30s, 2m or 1h30m".to_owned();
+    let compact: String = text.to_lowercase().split_whitespace().collect();
     if let Some(seconds) = whole(text) {
         return Ok(Duration::from_secs(seconds));
     }
-    let mut rest = text;
+    let mut rest = compact.as_str();
     let mut total = Duration::ZERO;
     while !rest.is_empty() {
-        let digits = rest.find(|c: char| !c.is_ascii_digit()).ok_or_else(wrong)?;
+        let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
+        let digits = rest.find(|c| !is_of_number(c)).ok_or_else(wrong)?;
         let (number, tail) = rest.split_at(digits);
-        let unit_end = tail.find(|c: char| c.is_ascii_digit()).unwrap_or(tail.len());
+        let unit_end = tail.find(is_of_number).unwrap_or(tail.len());
         let (unit, tail) = tail.split_at(unit_end);
         let unit_ms = match unit {
             "ms" => 1,
-            "s" => 1_000,
-            "m" => 60_000,
-            "h" => 3_600_000,
+            "s" | "sec" | "secs" | "second" | "seconds" => 1_000,
+            "m" | "min" | "mins" | "minute" | "minutes" => 60_000,
+            "h" | "hr" | "hrs" | "hour" | "hours" => 3_600_000,
             _ => return Err(wrong()),
         };
-        let part_ms = whole(number).and_then(|number| number.checked_mul(unit_ms)).ok_or_else(wrong)?;
+        let part_ms = thousandths(number).and_then(|number| number.checked_mul(unit_ms)).ok_or_else(wrong)? / 1_000;
         total = total.checked_add(Duration::from_millis(part_ms)).ok_or_else(wrong)?;
         rest = tail;
     }
-    if text.is_empty() { Err(wrong()) } else { Ok(total) }
+    if compact.is_empty() { Err(wrong()) } else { Ok(total) }
+}
+
+/// A number with at most three decimals, in thousandths.
+fn thousandths(number: &str) -> Option<u64> {
+    decimal(number, 3).filter(|_| !number.contains('_'))
+}
+
+/// A path in a list with commas, after each of which people may leave a blank.
+pub(crate) fn path_in_list() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().map(|path| match path.to_str().map(str::trim) {
+        Some(trimmed) if !trimmed.is_empty() && !path.exists() => PathBuf::from(trimmed),
+        _ => path,
+    })
+}
+
+/// An ending of files in a list with commas, as `png`, `.png` or `PNG`.
+pub(crate) fn ending(text: &str) -> Result<String, String> {
+    let trimmed = text.trim();
+    Ok(trimmed.strip_prefix('.').unwrap_or(trimmed).to_lowercase())
 }
 
 /// A number that consists of digits only: `parse` would accept `+5`, which is a typing mistake here.
@@ -117,24 +157,66 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_take_the_suffixes_k_and_m() {
+    fn counts_take_the_suffixes_k_and_m_and_decimals_that_leave_a_whole_number() {
         assert_eq!(count("0"), Ok(0));
         assert_eq!(count("40k"), Ok(40_000));
         assert_eq!(count("2M"), Ok(2_000_000));
+        assert_eq!(count("2.5k"), Ok(2_500));
+        assert_eq!(count("0.25M"), Ok(250_000));
+        assert_eq!(count("1_000_000"), Ok(1_000_000));
         assert_eq!(count("18446744073709551615"), Ok(u64::MAX));
-        for text in ["", "k", "-1", "+1", "1.5k", "1kk", "1 k", "18446744073709551616", "18446744073709551615k", "2m"] {
+        for text in [
+            "",
+            "k",
+            "-1",
+            "+1",
+            "1.5",
+            "1.",
+            ".5k",
+            "1.0005k",
+            "1kk",
+            "1 k",
+            "1__0",
+            "_1",
+            "1_",
+            "1.2.3k",
+            "18446744073709551616",
+            "18446744073709551615k",
+        ] {
             assert!(count(text).is_err(), "{text:?}");
         }
+        assert!(count("2m").is_err_and(|told| told.ends_with("for millions write 2M")));
     }
 
     #[test]
     fn durations_take_plain_seconds_and_units() {
-        assert_eq!(duration("90"), Ok(Duration::from_secs(90)));
-        assert_eq!(duration("30s"), Ok(Duration::from_secs(30)));
-        assert_eq!(duration("250ms"), Ok(Duration::from_millis(250)));
-        assert_eq!(duration("2m"), Ok(Duration::from_secs(120)));
-        assert_eq!(duration("1h30m"), Ok(Duration::from_secs(5_400)));
-        for text in ["", "s", "30 s", "-1s", "1d", "1s5", "99999999999999999999s", "9999999999999999999h"] {
+        for (text, ms) in [
+            ("90", 90_000),
+            ("30s", 30_000),
+            ("250ms", 250),
+            ("2m", 120_000),
+            ("1min", 60_000),
+            ("1 Min", 60_000),
+            ("1.5m", 90_000),
+            ("0.25s", 250),
+            ("90 seconds", 90_000),
+            ("1h30m", 5_400_000),
+        ] {
+            assert_eq!(duration(text), Ok(Duration::from_millis(ms)), "{text}");
+        }
+        for text in [
+            "",
+            "s",
+            "-1s",
+            "1d",
+            "1s5",
+            "1.5",
+            "1..5s",
+            "1.s",
+            "1_0s",
+            "99999999999999999999s",
+            "9999999999999999999h",
+        ] {
             assert!(duration(text).is_err(), "{text:?}");
         }
     }

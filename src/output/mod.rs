@@ -14,7 +14,7 @@ use std::time::Duration;
 use tempfile::{Builder, NamedTempFile, TempDir};
 
 pub use self::journal::Journal;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 
 /// How the names of temporary files begin and end.
 const PREFIX: &str = ".smalti-";
@@ -381,7 +381,7 @@ fn output_error(path: &Path, error: &io::Error) -> Error {
         FileTooLarge => {
             "is larger than a file may be here; raise the limit (ulimit -f), or name another disk".to_owned()
         }
-        _ => format!("cannot be written ({error}); name another file"),
+        _ => format!("cannot be written, since {}; name another file", in_words(error)),
     };
     Error::output(path, reason)
 }

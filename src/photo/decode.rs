@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use super::kinds::{Kind, READ, SIGNATURE_BYTES, kind_of};
 use super::raw::{CutShort, Raw, Space, by_image, check_memory, check_size, limits};
 use super::{Photo, color, frames, from_jpeg, from_png, from_tiff, jpeg_segments, resize};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::{guard, memory};
 
 /// Bytes per pixel while a picture is decoded. A pixel takes up to eight as it is stored; copies of it are in sRGB and
@@ -276,7 +276,8 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "there is no such file; check its name".to_owned(),
         io::ErrorKind::IsADirectory => "is a folder; name a file in it".to_owned(),
         io::ErrorKind::PermissionDenied => "may not be read; change its permissions".to_owned(),
-        _ => format!("cannot be read ({error}); try a copy of it"),
+        io::ErrorKind::InvalidFilename => "its name is too long; shorten it".to_owned(),
+        _ => format!("cannot be read, since {}; try a copy of it", in_words(error)),
     }
 }
 

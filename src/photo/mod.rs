@@ -7,6 +7,7 @@
 mod animation;
 mod camera_raw;
 mod color;
+mod color_words;
 mod decode;
 mod encode;
 mod frames;
@@ -29,6 +30,7 @@ mod weights;
 pub(crate) mod xml;
 
 pub use animation::{ApngEncoder, Frames, GIF_FRAMES_PER_S_MAX, GifEncoder, Timing};
+pub use color_words::{COLOR_FORMS, color};
 pub(crate) use decode::why_unreadable;
 pub use decode::{Background, Decoded, Loaded, ReadOptions, decoding_bytes, is_whole, kind_of_file, read};
 pub use encode::{Format, encode, encode_jpeg, encode_png, encode_png_with_alpha, encode_webp, encode_with_alpha};

@@ -14,6 +14,7 @@ use quantette::deps::palette::cast::from_array_slice;
 use quantette::wu::{BinnerU8x3, WuU8x3};
 
 use super::Photo;
+use super::color_words::color;
 use super::decode::{ReadOptions, is_picture, read, why_unreadable};
 use crate::error::{Error, Result};
 
@@ -81,7 +82,7 @@ pub(super) fn nearest(color: [u8; 3], palette: &[[u8; 3]]) -> [u8; 3] {
 }
 
 /// The palette in the file at `path`: a picture's colours in reading order, a GIMP palette (`.gpl`), a JASC palette
-/// (`.pal`), or lines of hexadecimal RRGGBB (`.hex`). Repeated colours are left out.
+/// (`.pal`), or lines of colours, as hexadecimal RRGGBB or by name (`.hex`). Repeated colours are left out.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, is none of these, or has no colour or more than [`COLOR_COUNT_MAX`].
@@ -104,7 +105,7 @@ pub fn read_palette(path: &Path) -> Result<Vec<[u8; 3]>> {
     let listed = parse_palette(&String::from_utf8_lossy(&bytes)).map_err(|line| {
         refused(format!(
             "is not a palette: line {line} is not a colour; use a GIMP palette, a JASC palette, \
-             lines of RRGGBB, or a picture"
+             lines of RRGGBB or of names of colours, or a picture"
         ))
     })?;
     match distinct_colors(&listed, COLOR_COUNT_MAX) {
@@ -121,7 +122,7 @@ fn parse_palette(text: &str) -> Result<Vec<[u8; 3]>, usize> {
     let first = text.lines().next().unwrap_or_default().trim_start_matches('\u{feff}').trim();
     let is_gimp = first == "GIMP Palette";
     let is_jasc = first == "JASC-PAL";
-    let parse = if is_gimp || is_jasc { parse_decimal } else { parse_hexadecimal };
+    let parse = if is_gimp || is_jasc { parse_decimal } else { color };
     let header_lines = if is_gimp {
         1
     } else if is_jasc {
@@ -146,14 +147,6 @@ fn parse_palette(text: &str) -> Result<Vec<[u8; 3]>, usize> {
 fn parse_decimal(line: &str) -> Option<[u8; 3]> {
     let mut channels = line.split_whitespace().map(|word| word.parse::<u8>().ok());
     Some([channels.next()??, channels.next()??, channels.next()??])
-}
-
-/// `RRGGBB`, with or without `#`.
-fn parse_hexadecimal(line: &str) -> Option<[u8; 3]> {
-    let digits = line.strip_prefix('#').unwrap_or(line);
-    let is_color = digits.len() == 6 && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
-    let [_, r, g, b] = u32::from_str_radix(digits, 16).ok().filter(|_| is_color)?.to_be_bytes();
-    Some([r, g, b])
 }
 
 #[cfg(test)]
@@ -197,7 +190,8 @@ mod tests {
         let jasc = "JASC-PAL\r\n0100\r\n2\r\n1 2 3\r\n255 0 9\r\n";
         assert_eq!(parse_palette(jasc), Ok(vec![[1, 2, 3], [255, 0, 9]]));
         assert_eq!(parse_palette("#010203\n\n; a comment\nFF0009\n"), Ok(vec![[1, 2, 3], [255, 0, 9]]));
-        assert_eq!(parse_palette("010203\nred\n"), Err(2));
+        assert_eq!(parse_palette("010203\nTeal\n"), Ok(vec![[1, 2, 3], [0, 128, 128]]));
+        assert_eq!(parse_palette("010203\nreddish\n"), Err(2));
         assert_eq!(parse_palette("GIMP Palette\n1 2\n"), Err(2));
         assert_eq!(parse_palette("GIMP Palette\n1 2 256\n"), Err(2));
     }

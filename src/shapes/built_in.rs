@@ -89,7 +89,7 @@ impl FromStr for BuiltIn {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|shape| shape.name() == name).ok_or_else(|| {
+        Self::ALL.into_iter().find(|shape| shape.name().eq_ignore_ascii_case(name)).ok_or_else(|| {
             let known = Self::ALL.map(Self::name).join(", ");
             Error::UnknownName { what: "built-in mask", name: name.to_owned(), known }
         })

@@ -122,7 +122,7 @@ impl FromStr for Shader {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|shader| shader.name() == name).ok_or_else(|| {
+        Self::ALL.into_iter().find(|shader| shader.name().eq_ignore_ascii_case(name.trim())).ok_or_else(|| {
             let known = Self::ALL.map(Self::name).join(", ");
             Error::UnknownName { what: "shader", name: name.to_owned(), known }
         })

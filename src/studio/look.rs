@@ -53,9 +53,11 @@ impl Mask {
         Ok(Self(MaskSource::Template(Arc::new(template))))
     }
 
-    /// A built-in shape if it has this name, else the file at this path, which is read when it is needed.
+    /// A built-in shape if it has this name, in any case, else the file at this path, which is read when it is needed.
     pub(crate) fn named_or_file(name: impl Into<PathBuf>) -> Self {
-        Self(MaskSource::Named(name.into()))
+        let path = name.into();
+        let shape = path.to_str().and_then(|word| word.trim().parse::<BuiltIn>().ok());
+        Self(MaskSource::Named(shape.map_or(path, |shape| shape.name().into())))
     }
 
     /// The name or path, if the mask has one.

@@ -120,7 +120,8 @@ trait FromText: Sized {
 
 impl FromText for String {
     fn from_text(text: &str) -> Result<Self, String> {
-        let known = Style::named(text).map(|_| text.to_owned());
+        let name = text.trim().to_ascii_lowercase();
+        let known = Style::named(&name).map(|_| name);
         known.ok_or_else(|| format!("there is no such style; there are {}", Style::NAMES.join(", ")))
     }
 }

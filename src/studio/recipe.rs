@@ -230,7 +230,7 @@ impl Recipe {
         self
     }
 
-    /// As [`Recipe::palette`], with the colours of a file: a GIMP palette, a JASC palette, lines of RRGGBB, or a
+    /// As [`Recipe::palette`], with the colours of a file: a GIMP palette, a JASC palette, lines of colours, or a
     /// picture. It is read when a picture is made.
     #[must_use]
     pub fn palette_file(mut self, path: impl Into<PathBuf>) -> Self {

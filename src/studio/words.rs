@@ -3,36 +3,24 @@
 
 use super::choices::{Colors, GroutColor};
 use crate::model::{Backdrop, Rgb};
-use crate::photo::COLOR_COUNT_MAX;
+use crate::photo::{self, COLOR_COUNT_MAX, COLOR_FORMS};
 
-/// A colour: `black`, `white`, or six hexadecimal digits with or without `#`.
+/// A colour: a name of CSS such as `teal`, or hexadecimal digits.
 pub(crate) fn color(text: &str) -> Result<Rgb, String> {
-    match text {
-        "black" => return Ok([0; 3]),
-        "white" => return Ok([255; 3]),
-        _ => {}
-    }
-    let digits = text.strip_prefix('#').unwrap_or(text);
-    let is_hexadecimal = digits.len() == 6 && digits.bytes().all(|byte| byte.is_ascii_hexdigit());
-    let packed = u32::from_str_radix(digits, 16).ok().filter(|_| is_hexadecimal);
-    let [_, r, g, b] = packed.ok_or("expected black, white or RRGGBB in hexadecimal")?.to_be_bytes();
-    Ok([r, g, b])
+    photo::color(text).ok_or_else(|| format!("expected {COLOR_FORMS}"))
 }
 
-/// What lies behind the tiles: `none`, or a colour.
+/// What lies behind the tiles: `none` or `transparent`, or a colour.
 pub(crate) fn backdrop(text: &str) -> Result<Backdrop, String> {
-    match text {
-        "none" => Ok(Backdrop::Transparent),
-        _ => {
-            let expected = |_| "expected none, black, white or RRGGBB in hexadecimal".to_owned();
-            color(text).map(Backdrop::Color).map_err(expected)
-        }
+    match text.trim().to_ascii_lowercase().as_str() {
+        "none" | "transparent" => Ok(Backdrop::Transparent),
+        _ => photo::color(text).map(Backdrop::Color).ok_or_else(|| format!("expected none, or {COLOR_FORMS}")),
     }
 }
 
 /// `full`, or a whole number of colours.
 pub(crate) fn color_count(text: &str) -> Result<Colors, String> {
-    if text == "full" {
+    if text.eq_ignore_ascii_case("full") {
         return Ok(Colors::Full);
     }
     let is_whole = text.bytes().all(|byte| byte.is_ascii_digit());
@@ -44,13 +32,10 @@ pub(crate) fn color_count(text: &str) -> Result<Colors, String> {
 
 /// A colour of grout: `none`, `auto`, or a colour.
 pub(crate) fn grout_color(text: &str) -> Result<GroutColor, String> {
-    match text {
+    match text.trim().to_ascii_lowercase().as_str() {
         "none" => Ok(GroutColor::None),
         "auto" => Ok(GroutColor::Auto),
-        _ => {
-            let expected = |_| "expected none, auto, black, white or RRGGBB in hexadecimal".to_owned();
-            color(text).map(GroutColor::This).map_err(expected)
-        }
+        _ => photo::color(text).map(GroutColor::This).ok_or_else(|| format!("expected none, auto, or {COLOR_FORMS}")),
     }
 }
 
@@ -59,14 +44,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_are_named_or_six_hexadecimal_digits() {
-        assert_eq!(color("black"), Ok([0, 0, 0]));
-        assert_eq!(color("white"), Ok([255, 255, 255]));
-        assert_eq!(color("#12aBff"), Ok([0x12, 0xAB, 0xFF]));
-        assert_eq!(color("000001"), Ok([0, 0, 1]));
-        for text in ["", "#", "red", "12345", "#1234567", "+12345", "gggggg"] {
-            assert!(color(text).is_err(), "{text:?}");
-        }
+    fn words_beside_colours_are_known_in_any_case() {
+        assert_eq!(backdrop("None"), Ok(Backdrop::Transparent));
+        assert_eq!(backdrop("Navy"), Ok(Backdrop::Color([0, 0, 128])));
+        assert_eq!(grout_color("AUTO"), Ok(GroutColor::Auto));
+        assert_eq!(color("reddish"), Err("expected a colour such as red, #f00 or ff0000".to_owned()));
     }
 
     #[test]

@@ -72,7 +72,7 @@ fn values_out_of_range_are_refused_with_their_flag() {
         ("--cool NaN --restarts 1", "--cool NaN"),
         ("--patience 0", "--patience 0"),
         ("--time soon", "--time"),
-        ("--background red", "--background"),
+        ("--background reddish", "--background"),
         ("--threads 0", "--threads 0"),
         ("--scheme quick", "--scheme"),
         ("--device gpu", "--device gpu"),

@@ -24,6 +24,7 @@ mod front_door_bounds;
 mod glazed_vulkan;
 mod grout;
 mod guides;
+mod hints;
 mod hostile_files;
 mod hostile_names;
 mod hostile_scripts;

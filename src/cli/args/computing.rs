@@ -17,11 +17,14 @@ const THREADS_MAX: u64 = 1_024;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Computing")]
 pub(crate) struct ComputingArgs {
-    /// What computes: auto (best GPU, else the CPU), cpu, vulkan, a number, uuid:HEX, pci:ADDRESS, name:PART
-    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", default_value = "auto")]
+    /// What computes: auto (the best GPU, else the CPU), cpu, vulkan, or one of smalti devices by its number or a part
+    /// of its name
+    ///
+    /// uuid:HEX and pci:ADDRESS name a device exactly. The result is the same on every device.
+    #[arg(long, value_name = "DEVICE", env = "SMALTI_DEVICE", hide_env_values = true, default_value = "auto")]
     pub device: String,
-    /// CPU threads, 1 to 1,024; changes no result [default: all]
-    #[arg(long, value_name = "T", env = "SMALTI_THREADS", value_parser = thread_choice)]
+    /// CPU threads, 1 to 1,024; the result does not depend on them [default: all]
+    #[arg(long, value_name = "T", env = "SMALTI_THREADS", hide_env_values = true, value_parser = thread_choice)]
     pub threads: Option<ThreadChoice>,
 }
 
@@ -37,8 +40,7 @@ fn thread_choice(text: &str) -> Result<ThreadChoice, String> {
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Computing")]
 pub(crate) struct DevicesArg {
-    /// Several devices instead of one, each with pictures of its own: all (every hardware GPU), or a list with commas
-    /// of what --device takes
+    /// Use several devices, each for its own pictures: all (every hardware GPU), or a list such as 0,1
     #[arg(long, value_name = "all|LIST")]
     pub devices: Option<String>,
 }
@@ -151,5 +153,20 @@ fn request(text: &str) -> Result<DeviceRequest> {
         );
         return Err(Error::NoSuitableDevice { why: NoDevice::Other(why) });
     }
-    text.parse().map_err(|_| Error::Usage(format!("--device {text}: expected {}", DeviceRequest::FORMS)))
+    text.parse().or_else(|_| by_word(text))
+}
+
+/// The device that a word means which is none of the forms: a part of a name, but not what every GPU could be called.
+fn by_word(text: &str) -> Result<DeviceRequest> {
+    let word = text.to_lowercase();
+    if ["gpu", "cuda", "opencl", "metal", "rocm", "hardware"].contains(&word.as_str()) {
+        return Err(Error::Usage(format!(
+            "--device {text}: write --device auto, which takes the best GPU and, where there is none, the CPU; smalti \
+             devices lists what there is"
+        )));
+    }
+    if word.len() >= 3 && word.starts_with(char::is_alphabetic) && !word.contains([':', ',']) {
+        return Ok(DeviceRequest::Name(word));
+    }
+    Err(Error::Usage(format!("--device {text}: expected {}", DeviceRequest::FORMS)))
 }

@@ -13,20 +13,22 @@ use crate::studio::{LookChoices, Mask};
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Tiles")]
 pub(crate) struct LookArgs {
-    /// Shape of the tiles: square, border, lines, flower, disc, triangle, hexagon, brush, or a PNG or SVG file; several
-    /// with commas or repeated, for a mix, in which --scheme cells counts each once [default: square, or as the style
-    /// or the population has it]
-    #[arg(long = "mask", value_name = "NAME|FILE", value_delimiter = ',')]
+    /// Shape of the tiles: square, border, lines, flower, disc, triangle, hexagon, brush, or your own PNG or SVG
+    ///
+    /// Several shapes with commas make a mix. Unless this flag is given, the style or the population decides; else it
+    /// is square.
+    #[arg(long = "mask", value_name = "NAME|FILE", value_delimiter = ',', value_parser = values::path_in_list())]
     pub masks: Vec<PathBuf>,
-    /// What the drawing of a mask becomes: template (its own shading), flat, outline, emboss, soft, hollow, negative,
-    /// fade or wash; for the masks that are named [default: template, or as the style has it]
+    /// How a shape is filled: template (as drawn), flat, outline, emboss, soft, hollow, negative, fade or wash
+    ///
+    /// It needs shapes that are named. Unless this flag is given, the style decides; else it is template.
     #[arg(long, value_name = "NAME")]
     pub shader: Option<Shader>,
-    /// Whether a mask's coverage cuts the tile out or is its opacity [default: translucent with --opacity or the
-    /// shaders soft, fade and wash, or as the style has it, else opaque]
+    /// Whether tiles hide what is behind them or let it show through [default: by the style; translucent with
+    /// --opacity or the shaders soft, fade and wash]
     #[arg(long, value_enum, value_name = "KIND")]
     pub blend: Option<BlendName>,
-    /// Opacity of whole tiles, 0.01 to 1 [default: 1, or as the style has it]
+    /// Opacity of the tiles, 0.01 (almost invisible) to 1 [default: by the style, else 1]
     #[arg(long, value_name = "A", value_parser = values::number)]
     pub opacity: Option<f64>,
 }

@@ -9,8 +9,17 @@ use crate::cli::terminal::progress::ProgressKind;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Messages")]
 pub(crate) struct MessageArgs {
-    /// How to show progress on stderr; a bar needs a terminal, elsewhere it becomes plain lines
-    #[arg(long, value_enum, value_name = "KIND", env = "SMALTI_PROGRESS", default_value = "auto")]
+    /// How to show progress on stderr
+    ///
+    /// A bar needs a terminal; elsewhere it becomes plain lines.
+    #[arg(
+        long,
+        value_enum,
+        value_name = "KIND",
+        env = "SMALTI_PROGRESS",
+        hide_env_values = true,
+        default_value = "auto"
+    )]
     pub progress: ProgressKind,
     /// Say more
     #[arg(short, long, conflicts_with = "quiet")]

@@ -21,63 +21,80 @@ use crate::studio::{Colors, Preset, Recipe, Scheme, Settings, backdrop, color_co
 /// The flags.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PictureArgs {
-    /// Longer side of the written picture, 1 to 65,535 px; the mosaic is drawn anew at that size [default: as evolved]
+    /// Longer side of the written picture in px [default: as evolved]
+    ///
+    /// The mosaic is drawn anew at this size, so its tiles stay sharp. 1 to 65,535 px.
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Output")]
     pub output_size: Option<u64>,
-    /// Number of tiles, 1 to 1,000,000 (suffixes k, M) [default: 2500 * sqrt(width * height) / 256, rounded]
+    /// Number of tiles, such as 4000 or 2.5k [default: by the size; 5,000 at 512x512]
+    ///
+    /// 1 to 1,000,000. The default is 2500 * sqrt(width * height) / 256.
     #[arg(short = 'n', long, value_name = "N", value_parser = values::count, help_heading = "Picture")]
     pub tiles: Option<u64>,
-    /// Longer side that the picture is reduced to before it is evolved, 1 to 65,535 px; never enlarged [default: 512]
+    /// Longer side in px at which the picture evolves [default: 512]
+    ///
+    /// A larger picture is reduced to this size first; a smaller one is never enlarged. 1 to 65,535 px.
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
     pub size: Option<u64>,
-    /// Colours that the picture is reduced to before it is evolved: full, or 1 to 256 [default: full]
+    /// Reduce the picture to this many colours first: 1 to 256, or full for all of them [default: full]
     #[arg(long, value_name = "K", value_parser = color_count, help_heading = "Picture", conflicts_with = "palette")]
     pub colors: Option<Colors>,
-    /// Palette that picture and tiles are held to: .gpl, .pal, .hex (lines of RRGGBB), or the colours of a picture
+    /// Use only the colours in this file, for the picture and for the tiles: .gpl, .pal, .hex (one colour a line), or
+    /// a picture of at most 256 colours
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     pub palette: Option<PathBuf>,
-    /// Colour behind the tiles and behind transparent pixels: black, white or RRGGBB; or none, and the mosaic is
-    /// transparent where no tile is [default: as in --init or the style, or black; what is transparent stays so, but
-    /// not with --scheme paper]
+    /// Colour behind the tiles and behind transparent pixels, or none for a transparent background
+    ///
+    /// A colour is a name such as navy, or hexadecimal digits such as #f80 or ff8800. Without this flag, the
+    /// population of --init or the style decides, and otherwise it is black. Transparent parts of the picture then
+    /// stay transparent, except with --scheme paper.
     #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Picture")]
     pub background: Option<Backdrop>,
-    /// Map that tells where likeness matters, a picture with the proportions of IN: an error counts 16 times as much
-    /// where the map is white as where it is black [default: alike everywhere]
+    /// Picture that tells where likeness matters most: white parts count 16 times as much as black ones
+    ///
+    /// It must have the proportions of IN. Without it, all parts count the same.
     #[arg(long, value_name = "MAP", help_heading = "Picture")]
     pub weight: Option<PathBuf>,
-    /// Take of a picture that is cut short what is there, with a warning
+    /// If the file of the picture is cut short, use the part that is there
     #[arg(long, help_heading = "Picture")]
     pub lenient: bool,
-    /// Population to begin with, a .npz file of the same picture size; it also gives the number of tiles
+    /// Begin with the tiles of this population instead of random ones
+    ///
+    /// It must come from a picture of the same size. It also sets the number of tiles.
     #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]
     pub init: Option<PathBuf>,
 
     #[command(flatten)]
     pub look: LookArgs,
 
-    /// How to evolve: `cells` comes closest by far, `paper` is the published Fly algorithm [default: cells, or as
+    /// How to search: cells comes closest by far, paper is the published Fly algorithm [default: cells, or what
     /// --preset needs]
-    #[arg(long, value_enum, value_name = "NAME", help_heading = "Evolution")]
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Search")]
     pub scheme: Option<SchemeName>,
-    /// What other options begin from and change parts of: one of the paper's 12 schemes (Table 1), paper-1 to paper-12;
-    /// a style; or a file of your own that ends in .toml
-    #[arg(long, value_name = "NAME|FILE", value_parser = preset::parse, help_heading = "Evolution")]
+    /// Begin with these settings: a style, a scheme of the paper (paper-1 to paper-12), or your own .toml file
+    ///
+    /// Other flags change parts of it.
+    #[arg(long, value_name = "NAME|FILE", value_parser = preset::parse, help_heading = "Search")]
     pub preset: Option<PresetChoice>,
     /// Where the colour of a new tile comes from [default: median, or evolved with --scheme paper]
-    #[arg(long, value_enum, value_name = "MODE", help_heading = "Evolution")]
+    #[arg(long, value_enum, value_name = "MODE", help_heading = "Search")]
     pub color_mode: Option<ColorModeName>,
-    /// Stop once the sum of absolute errors is at most this (suffixes k, M) [default: never]
-    #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Evolution")]
+    /// Stop when the sum of absolute errors is this small (40k, 2M) [default: never]
+    #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Search")]
     pub target_sae: Option<u64>,
-    /// Stop after this many evals in which the error fell by less than a thousandth, at least 1 (suffixes k, M); with
-    /// --scheme paper, end a run after this many births without improvement [default: never]
-    #[arg(long, value_name = "E", value_parser = values::count, help_heading = "Evolution")]
+    /// Stop after trying this many children without progress (40k, 2M) [default: never]
+    ///
+    /// Progress means that the error falls by at least a thousandth. With --scheme paper, this many births without any
+    /// improvement end a run.
+    #[arg(long, value_name = "E", value_parser = values::count, help_heading = "Search")]
     pub patience: Option<u64>,
-    /// Stop after this time even if evals are left: 90, 30s, 2m, 1h30m [default: never]
-    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Evolution")]
+    /// Stop after this time, such as 90, 30s, 2m or 1h30m [default: no limit]
+    ///
+    /// The search may end earlier, when it has spent --evals.
+    #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Search")]
     pub time: Option<Duration>,
-    /// Number that decides every random choice
-    #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0, help_heading = "Evolution")]
+    /// Number that decides every random choice; the same seed gives the same picture
+    #[arg(long, value_name = "S", value_parser = values::seed, default_value_t = 0, help_heading = "Search")]
     pub seed: u64,
     #[command(flatten)]
     pub cells: CellsArgs,

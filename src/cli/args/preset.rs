@@ -34,17 +34,19 @@ pub(crate) fn style_names() -> String {
 
 /// Reads the name of a style; the error lists all names.
 pub(crate) fn parse_style(name: &str) -> Result<String, String> {
-    let known = Style::named(name).map(|_| name.to_owned());
+    let name = name.trim().to_ascii_lowercase();
+    let known = Style::named(&name).map(|_| name);
     known.ok_or_else(|| format!("there is no such style; there are {}", style_names()))
 }
 
 /// Reads the name of a preset; the error lists all names.
 pub(crate) fn parse(name: &str) -> Result<PresetChoice, String> {
-    if let Some(preset) = PaperPreset::named(name) {
+    let word = name.trim().to_ascii_lowercase();
+    if let Some(preset) = PaperPreset::named(&word) {
         return Ok(PresetChoice::Paper(preset));
     }
-    if Style::named(name).is_some() {
-        return Ok(PresetChoice::Style(name.to_owned()));
+    if Style::named(&word).is_some() {
+        return Ok(PresetChoice::Style(word));
     }
     if Path::new(name).extension().is_some_and(|extension| extension == "toml") {
         return Ok(PresetChoice::File(name.into()));
@@ -60,6 +62,8 @@ mod tests {
     #[test]
     fn a_preset_is_a_scheme_of_the_paper_a_style_or_a_file() {
         assert_eq!(parse("mosaic"), Ok(PresetChoice::Style("mosaic".to_owned())));
+        assert_eq!(parse(" Mosaic"), Ok(PresetChoice::Style("mosaic".to_owned())));
+        assert_eq!(parse("Paper-3"), Ok(PresetChoice::Paper(PaperPreset::paper(3))));
         assert_eq!(parse("my/own.toml"), Ok(PresetChoice::File("my/own.toml".into())));
         assert_eq!(parse("paper-3"), Ok(PresetChoice::Paper(PaperPreset::paper(3))));
         assert!(parse("toml").is_err() && parse_style("toml").is_err());

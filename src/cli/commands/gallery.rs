@@ -18,7 +18,7 @@ use crate::cli::mosaics::{Made, MosaicsArgs, PaperRecipe, Workshop};
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::{self, Verbosity};
 use crate::cli::values;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::evolve::{ColorMode, ColorRule, PaperScheme};
 use crate::model::{Canvas, Target};
 use crate::output;
@@ -45,10 +45,10 @@ pub(crate) struct GalleryArgs {
     /// Pictures to show every mask and shader on
     #[arg(value_name = "IN", required = true)]
     pub inputs: Vec<PathBuf>,
-    /// Folder for README.md and its contact sheets; created if it is missing
+    /// Folder for README.md and its pictures; made if it is not there
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Births of each of four runs (suffixes k, M)
+    /// Births in each of the four runs (4k, 40k)
     #[arg(long, value_name = "B", value_parser = values::count, default_value = "5k")]
     pub births: u64,
     #[command(flatten)]
@@ -72,8 +72,9 @@ fn try_make(args: &GalleryArgs) -> Result<()> {
     let verbosity = args.mosaics.verbosity();
     let targets = args.inputs.iter().map(|path| read(path, verbosity)).collect::<Result<Vec<_>>>()?;
     let interrupt = Interrupt::listen()?;
-    std::fs::create_dir_all(&args.output)
-        .map_err(|error| Error::output(&args.output, format!("cannot be created ({error}); name another folder")))?;
+    std::fs::create_dir_all(&args.output).map_err(|error| {
+        Error::output(&args.output, format!("cannot be created, since {}; name another folder", in_words(&error)))
+    })?;
     output::check_writable(&page)?;
     let device = args.mosaics.computing.begin(verbosity)?;
     let write = |path: &Path, bytes: &[u8]| {

@@ -11,7 +11,7 @@ use clap_complete::Shell;
 use crate::cli::files::destination;
 use crate::cli::terminal;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::output;
 
 #[derive(Clone, Debug, Args)]
@@ -79,8 +79,9 @@ fn rendered(command: &Command) -> Result<Vec<u8>> {
 }
 
 fn write(pages: &[Command], folder: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::output(folder, format!("the folder cannot be created ({error}); name another one")))?;
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Error::output(folder, format!("the folder cannot be created, since {}; name another one", in_words(&error)))
+    })?;
     destination::sweep(folder)?;
     let interrupt = Interrupt::listen()?;
     for command in pages {
@@ -96,9 +97,10 @@ fn write(pages: &[Command], folder: &Path) -> Result<()> {
 fn print(bytes: &[u8]) -> Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
-        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Error::output(Path::new("stdout"), format!("cannot be written ({error}); redirect it to a file")))
-        }
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Error::output(
+            Path::new("stdout"),
+            format!("cannot be written, since {}; redirect it to a file", in_words(&error)),
+        )),
         _ => Ok(()),
     }
 }

@@ -38,17 +38,18 @@ Examples:
   smalti render flies.npz -o paper.webp --background white --supersample 8";
 
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_long_help = EXAMPLES)]
 pub(crate) struct RenderArgs {
-    /// Population to draw, a .npz file; `-` reads it from stdin
+    /// Population to draw, a .npz file; - reads it from stdin
     #[arg(value_name = "POP.npz", value_parser = values::input())]
     pub input: PathBuf,
 
-    /// Where to write the mosaic (.png .jpg .webp .svg .ora) or the population (.npz .csv .json); may repeat; `-`
-    /// writes a PNG to stdout
+    /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; may repeat
+    ///
+    /// .npz, .csv and .json hold the tiles themselves. - writes a PNG to stdout.
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
-    /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
+    /// Replace files that smalti did not write, or wrote with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,
     /// Print one line of JSON about the result to stdout
@@ -58,11 +59,12 @@ pub(crate) struct RenderArgs {
     /// Longer side of the written picture, 1 to 65,535 px [default: as evolved]
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
     pub output_size: Option<u64>,
-    /// Colour behind the tiles: black, white or RRGGBB; or none [default: as stored, which may be none; .jpg is then
-    /// over black]
+    /// Colour behind the tiles, such as navy or #f80, or none [default: as in the population]
+    ///
+    /// A .jpg cannot be transparent: instead of none, it has black.
     #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Picture")]
     pub background: Option<Backdrop>,
-    /// Samples along each side of a pixel, 1 to 16 [default: 1 as evolved, 4 and more at another size]
+    /// Samples along each side of a pixel, 1 to 16 [default: 1 at the size at which it evolved, else at least 4]
     #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Picture")]
     pub supersample: Option<u64>,
 
@@ -71,7 +73,7 @@ pub(crate) struct RenderArgs {
 
     #[command(flatten)]
     pub computing: ComputingArgs,
-    /// Watch every Vulkan call with the validation layer; any message is an error
+    /// Check every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
 

@@ -41,6 +41,13 @@ impl Destination {
             "json" => Content::Json,
             "csv" => Content::Csv,
             _ if path == Path::new("-") => Content::Png,
+            "gif" | "apng" | "mp4" | "webm" => {
+                let path = path.display();
+                return Err(Error::Usage(format!(
+                    "{path}: a mosaic is a still picture, such as .png; to watch it evolve, add --save-run run, and then run \
+                     smalti timelapse run -o {path}"
+                )));
+            }
             _ => {
                 return Err(Error::Usage(format!(
                     "{}: an output must end in .png, .jpg, .jpeg, .webp, .svg, .ora, .npz, .json or .csv, or be -",

@@ -15,7 +15,7 @@ use super::destination::Overwrite;
 use super::places::{Inputs, place_of};
 use crate::archive;
 use crate::cli::values::in_range;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::studio::SOFTWARE;
 
 /// Least digits of the evals in a name, so that names sort like their evals up to a trillion.
@@ -131,7 +131,10 @@ impl SaveRun {
     }
 
     fn unusable(&self, error: &io::Error) -> Error {
-        Error::output(&self.folder, format!("cannot be used as a folder for snapshots ({error}); name another one"))
+        Error::output(
+            &self.folder,
+            format!("cannot be used as a folder for snapshots, since {}; name another one", in_words(error)),
+        )
     }
 }
 
@@ -141,7 +144,17 @@ impl SaveRun {
 /// [`Error::Input`] if the folder cannot be read or holds no snapshot, if a snapshot does not tell its SAE, or if they
 /// come from more than one evolution.
 pub(crate) fn list(folder: &Path) -> Result<Vec<Snapshot>> {
-    let unreadable = |error: io::Error| Error::input(folder, format!("cannot be read as a folder ({error})"));
+    let unreadable = |error: io::Error| {
+        let reason = match error.kind() {
+            io::ErrorKind::NotFound => "there is no such folder; check its name".to_owned(),
+            io::ErrorKind::NotADirectory => {
+                "is a file, and a timelapse needs a folder of snapshots; smalti evolve --save-run DIR keeps them"
+                    .to_owned()
+            }
+            _ => format!("cannot be read as a folder, since {}", in_words(&error)),
+        };
+        Error::input(folder, reason)
+    };
     // Unlike `contents`, this must fail for a missing folder.
     fs::read_dir(folder).map_err(unreadable)?;
     let found = contents(folder).map_err(unreadable)?.snapshots.into_iter();

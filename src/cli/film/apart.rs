@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use crate::cli::files::child::in_its_own_group;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::threads;
 
 /// Time between two looks at whether a process has ended, or must be ended.
@@ -100,7 +100,7 @@ fn run(command: &mut Command, video: &Path, interrupt: &Interrupt) -> Result<Vec
     let unusable = |error: io::Error| {
         let reason = match error.kind() {
             io::ErrorKind::NotFound => "needs the program ffmpeg, which is not installed".to_owned(),
-            _ => format!("needs the program ffmpeg, which cannot be started ({error})"),
+            _ => format!("needs the program ffmpeg, which cannot be started, since {}", in_words(&error)),
         };
         Error::input(video, format!("{reason}; install the package ffmpeg, or give a folder of frames"))
     };

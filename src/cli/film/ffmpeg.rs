@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 
 use super::AnimationFile;
 use crate::cli::files::child::in_its_own_group;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::model::Mosaic;
 use crate::photo::Frames;
 use crate::threads;
@@ -173,7 +173,10 @@ fn not_started(path: &Path, error: &io::Error) -> Error {
         io::ErrorKind::NotFound => {
             "needs the program ffmpeg, which is not installed; install the package ffmpeg".to_owned()
         }
-        _ => format!("needs the program ffmpeg, which cannot be started ({error}); reinstall the package ffmpeg"),
+        _ => {
+            let why = in_words(error);
+            format!("needs the program ffmpeg, which cannot be started, since {why}; reinstall the package ffmpeg")
+        }
     };
     Error::output(path, format!("{reason}, or write .png or .gif"))
 }

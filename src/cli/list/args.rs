@@ -17,8 +17,7 @@ const IO_THREADS_MAX: usize = 64;
 /// The values of `--on-exists`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum OnExists {
-    /// Keep what is whole and of the same picture, options and seed; make anew what smalti made otherwise, and what is
-    /// damaged
+    /// Keep outputs that are whole and have the same picture, options and seed; make the others anew
     SkipSame,
     /// Keep whatever is there, without looking into it
     Skip,
@@ -53,43 +52,47 @@ Examples:
   smalti batch --manifest work.jsonl -o mosaics --shard 2/8
   find . -name '*.jpg' | jq -R '{input: .}' -c | smalti batch --manifest - -o mosaics
 
-Run the same command again to go on where it was interrupted, killed, or failed. A line of a manifest is an object with `input`,
-and as it likes `id`, `output`, `seed`, `preset`, `params` (flags without their minuses), `group` and `after`.";
+If a batch was interrupted, killed, or failed, run the same command again: it makes only what is missing or damaged.
+
+A line of a manifest is an object such as {\"input\": \"a.png\"}. It may also have id, output, seed, preset, params (flags without \
+their minuses), group and after; docs/batch.md explains them.";
 
 #[derive(Clone, Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_long_help = EXAMPLES)]
 pub(crate) struct BatchArgs {
     /// Pictures, folders of pictures, and patterns such as 'trip/*.jpg'
     #[arg(value_name = "IN")]
     pub inputs: Vec<PathBuf>,
-    /// More pictures, one object of JSON a line; `-` reads stdin
+    /// List of pictures, one JSON object a line; - reads stdin
     #[arg(long, value_name = "FILE")]
     pub manifest: Option<PathBuf>,
-    /// Also take what lies in folders below those that are named
+    /// Also take the pictures in folders below the named ones
     #[arg(long)]
     pub recursive: bool,
-    /// Do only a part of the batch: k/n is the k-th of n, auto asks the scheduler (Slurm, Kubernetes, Grid Engine, or
-    /// SHARD_INDEX and SHARD_COUNT) [default: all]
+    /// Do only a part of the batch: 3/8 is the third of eight; auto asks the scheduler [default: all]
+    ///
+    /// auto reads the numbers of a Slurm or Grid Engine array, of an indexed job of Kubernetes, or SHARD_INDEX and
+    /// SHARD_COUNT.
     #[arg(long, value_name = "k/n|auto", value_parser = shard::parse)]
     pub shard: Option<ShardChoice>,
 
-    /// Folder of the outputs; made if it is not there
+    /// Folder for the mosaics; made if it is not there
     #[arg(short, long, value_name = "DIR", help_heading = "Output")]
     pub output: PathBuf,
-    /// What is written of each picture: png, jpg, webp, svg, ora, npz, json, csv; several with commas
-    #[arg(long = "format", value_name = "EXT", value_delimiter = ',', default_value = "png", help_heading = "Output")]
+    /// What to write of each picture: png jpg webp svg ora npz csv json; several with commas
+    #[arg(long = "format", value_name = "EXT", value_delimiter = ',', value_parser = values::ending, default_value = "png", help_heading = "Output")]
     pub formats: Vec<String>,
-    /// Names of the outputs, with {stem} {suffix} {dir} {id} {group} {index} {seed} {ext}
+    /// Names of the outputs, made of {stem} {suffix} {dir} {id} {group} {index} {seed} {ext}
     #[arg(long, value_name = "NAME", value_parser = name::parse, default_value = "{dir}/{stem}.{ext}", help_heading = "Output")]
     pub name: NameTemplate,
-    /// Let rows of the manifest name outputs outside of the output folder
+    /// Let the manifest name outputs outside of the output folder
     #[arg(long, requires = "manifest", help_heading = "Output")]
     pub allow_outside: bool,
-    /// What to do about outputs that are there already
+    /// What to do where an output is there already
     #[arg(long, value_enum, value_name = "WHAT", default_value = "skip-same", help_heading = "Output")]
     pub on_exists: OnExists,
-    /// Where a line of JSON is added for every picture [default: results.jsonl in the output folder, or
-    /// results.K-of-N.jsonl of a shard]
+    /// Add a line of JSON about every picture to this file [default: results.jsonl in the output folder, or
+    /// results.K-of-N.jsonl for a shard]
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub results: Option<PathBuf>,
     /// Only list what would be done; write nothing
@@ -102,22 +105,22 @@ pub(crate) struct BatchArgs {
     #[command(flatten)]
     pub picture: PictureArgs,
 
-    /// Pictures that evolve at the same time on a device [default: one for each CPU thread; 256 on a GPU, 16 on
-    /// software Vulkan, or as many as its memory holds]
+    /// How many pictures evolve at the same time on a device [default: one for each CPU thread; on a GPU 256, on
+    /// software Vulkan 16, or fewer if its memory is full]
     #[arg(long, value_name = "N", value_parser = values::count, help_heading = "Computing")]
     pub in_flight: Option<u64>,
-    /// Threads that read pictures ahead, and that save them [default: half the CPU threads each]
+    /// How many threads read pictures, and how many save them, such as 2:1 [default: half the CPU threads each]
     #[arg(long, value_name = "LOAD:SAVE", value_parser = io_threads, help_heading = "Computing")]
     pub io_threads: Option<IoThreads>,
     #[command(flatten)]
     pub devices: DevicesArg,
     #[command(flatten)]
     pub computing: ComputingArgs,
-    /// Watch every Vulkan call with the validation layer; any message is an error
+    /// Check every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
 
-    /// Also write what threads and devices did when, as JSON for ui.perfetto.dev or chrome://tracing; changes no result
+    /// Write what threads and devices did at what time, to be seen in ui.perfetto.dev; the result stays the same
     #[arg(long, value_name = "FILE", help_heading = "Seeing inside")]
     pub trace: Option<PathBuf>,
 

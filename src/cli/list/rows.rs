@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 
 /// Most bytes of a line: more than any row has.
 pub(crate) const ROW_BYTES_MAX: u64 = 1 << 20;
@@ -179,8 +179,10 @@ fn is_torn(line: &[u8]) -> bool {
 
 fn unreadable(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::NotFound => "there is no such file; name results that smalti batch wrote".to_owned(),
-        _ => format!("cannot be read ({error})"),
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+            "there is no such file; name results that smalti batch wrote".to_owned()
+        }
+        _ => format!("cannot be read, since {}", in_words(error)),
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use clap::Command;
 
+use crate::archive::IS_A_PICTURE;
 use crate::error::{Error, NoDevice, Remedy};
 
 /// The advice when a Vulkan device has no memory left.
@@ -23,6 +24,9 @@ pub(crate) fn sentence(error: &Error) -> String {
         Error::OutOfDeviceMemory { .. } | Error::OutOfMemory { .. } => format!("{error}; {}", use_these(&LESS_MEMORY)),
         Error::DeviceLost { .. } => format!("{error}; run the same command again, or use --device cpu"),
         Error::Interrupted => format!("{error}; run the same command again"),
+        Error::Input { reason, .. } if reason == IS_A_PICTURE => {
+            format!("{error}, which smalti evolve writes with -o tiles.npz")
+        }
         Error::Internal(_) => format!("{error} with the command that led to it"),
         _ => error.to_string(),
     }

@@ -8,7 +8,7 @@ use signal_hook::consts::SIGINT;
 use signal_hook::low_level::unregister;
 use signal_hook::{SigId, flag};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::evolve::{Brake, StopReason};
 
 /// Exit code after an orderly end before the work was done. The same command may be run again.
@@ -70,7 +70,7 @@ fn is_to_be_ignored(_signal: i32) -> bool {
 }
 
 fn not_installed(error: &std::io::Error) -> Error {
-    Error::Internal(format!("the handlers of signals cannot be installed ({error})"))
+    Error::Internal(format!("the handlers of signals cannot be installed, since {}", in_words(error)))
 }
 
 /// Whether a signal asked for the work to end. All threads share it.

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 
 /// How much to say on stderr.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -47,7 +47,7 @@ pub(crate) fn write_stdout(bytes: &[u8]) -> Result<()> {
     };
     match written {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Error::output(Path::new("stdout"), format!("cannot be written ({error})")))
+            Err(Error::output(Path::new("stdout"), format!("cannot be written, since {}", in_words(&error))))
         }
         _ => Ok(()),
     }
@@ -60,7 +60,7 @@ pub(crate) fn write_picture_to_stdout(bytes: &[u8]) -> Result<()> {
             io::ErrorKind::BrokenPipe => {
                 "its reader went away before it had the picture; name a file instead".to_owned()
             }
-            _ => format!("cannot be written ({error}); name a file instead"),
+            _ => format!("cannot be written, since {}; name a file instead", in_words(&error)),
         };
         Error::output(Path::new("stdout"), reason)
     })

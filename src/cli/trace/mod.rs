@@ -28,11 +28,12 @@ use crate::studio::Device;
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Seeing inside")]
 pub(super) struct TraceArgs {
-    /// Also write what threads and device did when, as JSON for ui.perfetto.dev or chrome://tracing; changes no result
+    /// Write what threads and devices did at what time, to be seen in ui.perfetto.dev; the result stays the same
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
-    /// Have RenderDoc, under which the program must run, capture submissions of the Vulkan device: the number of the
-    /// first, counted from 1 as in --trace, and how many
+    /// Let RenderDoc capture some submissions to the Vulkan device: the first, counted from 1, and how many
+    ///
+    /// smalti must run under renderdoccmd capture.
     #[arg(long, value_name = "FIRST[+COUNT]", value_parser = capture::range)]
     pub capture: Option<CaptureRange>,
 }

@@ -357,7 +357,7 @@ fn an_array_whose_description_nests_too_deep_is_refused() {
 #[test]
 fn what_is_no_zip_file_is_refused() {
     for bytes in [&b""[..], b"hello", &ours()[..1000]] {
-        assert!(refusal(bytes).starts_with("is not a population: no readable .npz file"), "{}", refusal(bytes));
+        assert!(refusal(bytes).starts_with("is not a population: it is no .npz file"), "{}", refusal(bytes));
     }
     assert!(read(Path::new("/no/such/file.npz")).is_err());
 }

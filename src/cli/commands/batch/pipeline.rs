@@ -24,7 +24,7 @@ use crate::cli::list::Item;
 use crate::cli::terminal::advice::why_no_vulkan;
 use crate::cli::terminal::aside::{self, Aside, unless_it_panics};
 use crate::cli::terminal::{self, Verbosity};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::evolve::Ending;
 use crate::studio::{Device, Drawn};
 use crate::{output, photo, threads};
@@ -224,7 +224,10 @@ impl<'a> Pipeline<'a> {
             let path = &file.destination.path;
             let folder = path.parent().unwrap_or(Path::new("."));
             std::fs::create_dir_all(folder).map_err(|error| {
-                Error::output(folder, format!("the folder cannot be created ({error}); name another one"))
+                Error::output(
+                    folder,
+                    format!("the folder cannot be created, since {}; name another one", in_words(&error)),
+                )
             })?;
             // No sync to disk: if a crash of the system cuts a file short, the next run finds it and makes it anew.
             self.interrupt.while_writing(|| output::write_atomically_soon(path, &file.bytes))?;

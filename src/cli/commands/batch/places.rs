@@ -8,7 +8,7 @@ use crate::cli::files::destination::sweep;
 use crate::cli::files::inputs::{Depth, Givers};
 use crate::cli::files::places::Inputs;
 use crate::cli::list::{BatchArgs, Item, rows};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::output::{self, Journal};
 
 /// The places of all pictures that a batch reads or writes.
@@ -62,7 +62,10 @@ impl<'a> Taken<'a> {
 /// Creates the output folder, removes what killed processes left in it, and opens the results file.
 pub(super) fn prepare(args: &BatchArgs, items: &[Item], results: &Path) -> Result<Journal> {
     std::fs::create_dir_all(&args.output).map_err(|error| {
-        Error::output(&args.output, format!("the folder cannot be created ({error}); name another one"))
+        Error::output(
+            &args.output,
+            format!("the folder cannot be created, since {}; name another one", in_words(&error)),
+        )
     })?;
     output::check_folder_writable(&args.output)?;
     let outputs = items.iter().flat_map(|item| &item.outputs).map(|output| output.path.as_path());

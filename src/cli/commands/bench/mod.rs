@@ -30,19 +30,15 @@ use crate::studio::Device;
 const TIME_MAX: Duration = Duration::from_secs(3_600);
 
 const AFTER_HELP: &str = "\
-Measured, after a warm-up, as the median of as many repeats as fit into --time, at least one:
-  full evaluation   layers, marginal fitness of every tile and SAE of a whole population
-  paper             births of the published algorithm, one by one or in batches
-  cells             children evaluated by the search in cells, in the styles free and mosaic, K children a
-                    step, from a population that 8 rounds have formed; births are those that were accepted
-  picture           default runs at 512 px, from the decoded picture to the drawn mosaic; if --time is shorter
-                    than a run, its search is extrapolated
-  pass              time on a Vulkan device, where it has timestamps: of a full evaluation, and of a round of the
-                    search in cells in the style free with one child a step
+Each figure is the median of as many repeats as fit into --time, at least one, after a warm-up:
+  full evaluation  layers, marginal fitness of every tile, and SAE of a whole population
+  paper            births of the published algorithm, one by one or in batches
+  cells            children tried by the search in cells, in the styles free and mosaic
+  picture          whole runs at 512 px, from the decoded picture to the drawn mosaic; extrapolated if --time is too short for one
+  pass             time of each pass on a Vulkan device, if it has timestamps
 
-JSON (one object): schema is \"smalti-bench\", schema_version 1, version smalti's; picture (\"built-in\", or the
-SHA-256 of IN); time_ms; machine with os, architecture, cpu_count, threads, device, driver; measurements, each with
-name, unit (evals/s, births/s, ms, pictures/h), value, low, high and repeats.
+--json prints one object with schema, schema_version, version, picture, time_ms, machine and measurements. Each measurement has \
+name, unit, value, low, high and repeats.
 
 Examples:
   smalti bench
@@ -55,13 +51,13 @@ pub(crate) struct BenchArgs {
     /// Picture to measure with, of 512 px or more on its longer side [default: a built-in one]
     #[arg(long, value_name = "IN")]
     pub input: Option<PathBuf>,
-    /// Time for each of some 15 measurements: 500ms, 2s
+    /// Time for each of about 15 measurements, such as 500ms or 2s
     #[arg(long, value_name = "TIME", value_parser = values::duration, default_value = "1500ms")]
     pub time: Duration,
     /// Print JSON to stdout instead of a table
     #[arg(long)]
     pub json: bool,
-    /// Also compare with an older result of --json; what is more than 5 % slower is marked
+    /// Also compare with an older result of --json, and mark what is more than 5 % slower
     #[arg(long, value_name = "OLD.json")]
     pub compare: Option<PathBuf>,
     #[command(flatten)]

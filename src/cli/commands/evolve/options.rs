@@ -27,33 +27,34 @@ Examples:
   smalti evolve photo.jpg -o - --quiet > mosaic.png";
 
 #[derive(Clone, Debug, Args)]
-#[command(after_help = EVOLVE_EXAMPLES)]
+#[command(after_long_help = EVOLVE_EXAMPLES)]
 pub(crate) struct EvolveArgs {
-    /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP, or the first frame of a GIF; `-` reads it from stdin
+    /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP or GIF; - reads it from stdin
     #[arg(value_name = "IN", value_parser = values::input())]
     pub input: PathBuf,
 
-    /// Where to write the mosaic (.png .jpg .webp .svg .ora) or the population (.npz .csv .json); may repeat; `-`
-    /// writes a PNG to stdout
+    /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; may repeat
+    ///
+    /// .npz, .csv and .json hold the tiles themselves; smalti render draws a .npz again. - writes a PNG to stdout.
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
-    /// Also write the picture that was evolved towards, fitted to size, as a PNG
+    /// Also write the picture that the mosaic imitates, at the size at which it evolves, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
-    /// Also write how the error fell as a table (.csv) or a plot (.svg); may repeat
+    /// Also write how the error fell, as a table (.csv) or a plot (.svg); may repeat
     #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
     pub curves: Vec<PathBuf>,
-    /// Also keep the course of the evolution: snapshots of its best population, for `smalti timelapse`
+    /// Also keep about 250 snapshots of the evolution in this folder, for smalti timelapse
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub save_run: Option<PathBuf>,
-    /// Most evals or births between two snapshots, at least 1 (suffixes k, M); the first ones come closer [default: a
-    /// 100th of all]
+    /// Take a snapshot at least every B evals or births (40k, 2M); early ones are closer together [default: a 100th of
+    /// all]
     #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
     pub save_every: Option<u64>,
-    /// Replace outputs that are not smalti's or were made with other options, and .csv files that hold another table
+    /// Replace files that smalti did not write, or wrote with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,
-    /// Only say what would be done; write nothing
+    /// Only check everything and say what would be done; write nothing
     #[arg(long, help_heading = "Output")]
     pub dry_run: bool,
     /// Print one line of JSON about the result to stdout
@@ -65,7 +66,7 @@ pub(crate) struct EvolveArgs {
 
     #[command(flatten)]
     pub computing: ComputingArgs,
-    /// Watch every Vulkan call with the validation layer; any message is an error
+    /// Check every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
     #[command(flatten)]

@@ -18,7 +18,7 @@ use crate::cli::list;
 use crate::cli::list::rows::{self, ResultRow, RowParts, Rows};
 use crate::cli::terminal;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::output;
 
 /// Exit code when some pictures failed or are missing.
@@ -30,8 +30,8 @@ const AFTER_HELP: &str = "\
 Of several rows of one picture the newest counts. In one file that is the last. A row whose file holds another result
 by now is told.
 
-Exit codes: 0 every picture is there, 1 the output cannot be written, 2 wrong usage or unreadable input, 3 some pictures
-failed or are missing.
+Exit codes: 0 every picture is there; 1 the output cannot be written; 2 wrong usage or unreadable input; 3 some pictures failed or \
+are missing.
 
 Examples:
   smalti merge out/results.*.jsonl -o all.jsonl
@@ -44,7 +44,7 @@ pub(crate) struct MergeArgs {
     /// Files of result rows that `smalti batch` wrote, or folders with files named results*.jsonl
     #[arg(value_name = "RESULTS", required = true)]
     pub results: Vec<PathBuf>,
-    /// Where to write the rows, one of each picture, in the natural order of their ids; `-` is stdout
+    /// File for the rows, one for each picture; - is stdout
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Manifest whose pictures should all have a row; may repeat
@@ -165,7 +165,8 @@ fn result_files(paths: &[PathBuf], output: &Path) -> Result<Vec<PathBuf>> {
             files.push(path.clone());
             continue;
         }
-        let entries = fs::read_dir(path).map_err(|error| Error::input(path, format!("cannot be read ({error})")))?;
+        let entries = fs::read_dir(path)
+            .map_err(|error| Error::input(path, format!("cannot be read, since {}", in_words(&error))))?;
         let names = entries.flatten().map(|entry| entry.file_name()).filter(|name| is_results_name(name));
         let is_own = |name: &OsString| Some(name.as_os_str()) == own_name && place_of(&path.join(name)) == own_place;
         let names = names.filter(|name| !is_own(name));

@@ -7,7 +7,7 @@ use super::page::{GENERATOR, Page};
 use crate::cli::files::destination::{self, Overwrite};
 use crate::cli::files::places::Inputs;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::output;
 use crate::photo::{self, Metadata, Photo};
 
@@ -85,8 +85,9 @@ impl<'a> Folder<'a> {
 }
 
 fn create(folder: &Path, told: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder)
-        .map_err(|error| Error::output(told, format!("its folder cannot be created ({error}); name another one")))
+    std::fs::create_dir_all(folder).map_err(|error| {
+        Error::output(told, format!("its folder cannot be created, since {}; name another one", in_words(&error)))
+    })
 }
 
 /// Whether `folder` is empty or holds a page of ours.

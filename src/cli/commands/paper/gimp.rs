@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use crate::cli::files::child::in_its_own_group;
 use crate::cli::terminal::advice;
 use crate::cli::terminal::interrupt::Interrupt;
+use crate::error::in_words;
 use crate::model::mask::{MASK_SIDE, Mask};
 use crate::photo::{self, Photo, ReadOptions};
 
@@ -40,7 +41,8 @@ pub(super) fn is_installed() -> bool {
 /// # Errors
 /// A sentence for the page if no picture comes out, for instance because the user interrupts.
 pub(super) fn paint(picture: &Photo, stroke_count: usize, mask: &Mask, interrupt: &Interrupt) -> Result<Photo, String> {
-    let folder = tempfile::tempdir().map_err(|error| failed(&format!("no temporary folder: {error}")))?;
+    let folder = tempfile::tempdir()
+        .map_err(|error| failed(&format!("there is no place for temporary files, since {}", in_words(&error))))?;
     let files = Files { folder: folder.path() };
     files.prepare(picture, stroke_count, mask)?;
     files.run(interrupt)?;
@@ -77,7 +79,7 @@ impl Files<'_> {
             let folder = path.parent().unwrap_or(self.folder);
             std::fs::create_dir_all(folder)
                 .and_then(|()| std::fs::write(&path, bytes))
-                .map_err(|error| failed(&format!("its folder cannot be written ({error})")))?;
+                .map_err(|error| failed(&format!("its folder cannot be written, since {}", in_words(&error))))?;
         }
         Ok(())
     }
@@ -92,8 +94,9 @@ impl Files<'_> {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::null());
-        let mut gimp =
-            in_its_own_group(&mut command).spawn().map_err(|error| failed(&format!("it does not start ({error})")))?;
+        let mut gimp = in_its_own_group(&mut command)
+            .spawn()
+            .map_err(|error| failed(&format!("it does not start, since {}", in_words(&error))))?;
         let began = Instant::now();
         loop {
             match gimp.try_wait() {

@@ -36,18 +36,18 @@ Examples:
 
 /// The flags.
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_long_help = EXAMPLES)]
 pub(crate) struct PaperArgs {
     /// What to make: a figure or table of the paper, or all of them
     #[arg(value_enum, value_name = "NAME")]
     pub name: Name,
-    /// Folder with the pictures, PNG or JPEG or any other kind that is read; tables 1 and 2 and figure 7 need none
+    /// Folder of the pictures to use; tables 1 and 2 and figure 7 need none
     #[arg(long, value_name = "DIR")]
     pub images: Option<PathBuf>,
-    /// Folder for the page and what belongs to it; created if it is missing
+    /// Folder for the pages; made if it is not there
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Births of each run (suffixes k, M); fewer for a quick look
+    /// Births in each run (4k, 40k); fewer for a quick look
     #[arg(long, value_name = "B", value_parser = values::count, default_value = "40k")]
     pub births: u64,
     #[command(flatten)]

@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 use crate::cli::files::destination::{self, Overwrite};
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::output;
 
 /// The file that lists the others.
@@ -34,8 +34,9 @@ struct List {
 /// [`Error::Usage`] if it would replace a file that no plan wrote, or that was changed since; [`Error::Output`] if one
 /// cannot be written.
 pub(super) fn write(folder: &Path, files: &BTreeMap<String, String>, overwrite: Overwrite) -> Result<()> {
-    fs::create_dir_all(folder)
-        .map_err(|error| Error::output(folder, format!("cannot be created ({error}); name another folder")))?;
+    fs::create_dir_all(folder).map_err(|error| {
+        Error::output(folder, format!("cannot be created, since {}; name another folder", in_words(&error)))
+    })?;
     let old = old_list(folder, overwrite)?;
     check_ours(folder, files, &old, overwrite)?;
     // Old and new hashes are written together first, so that whatever an interruption leaves is recognised.
@@ -54,7 +55,10 @@ pub(super) fn write(folder: &Path, files: &BTreeMap<String, String>, overwrite: 
         let path = folder.join(name);
         if !files.contains_key(name) && is_one_of(&path, hashes) {
             fs::remove_file(&path).map_err(|error| {
-                Error::output(&path, format!("belongs to an older plan and cannot be removed ({error})"))
+                Error::output(
+                    &path,
+                    format!("belongs to an older plan and cannot be removed, since {}", in_words(&error)),
+                )
             })?;
         }
     }

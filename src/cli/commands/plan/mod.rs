@@ -21,7 +21,7 @@ use crate::cli::list::{self, BatchArgs, Item, ManifestRow};
 use crate::cli::terminal::{self, Verbosity};
 use crate::cli::trace::Tracer;
 use crate::cli::values::{self, in_range, quoted};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 
 /// A shard with less work than this, in seconds, costs a cluster too much compared with its work.
 const SHARD_MIN_S: f64 = 60.0;
@@ -47,9 +47,13 @@ const KEPT_FLAGS: [&str; 15] = [
     "force",
 ];
 
+/// Clap would write one line that is wider than a terminal.
+const USAGE: &str = "smalti plan [OPTIONS] -o <DIR> <--shards N|--per-shard N|--minutes M> [IN]...";
+
 const AFTER_HELP: &str = "\
-Writes into the folder of --into: manifest.jsonl with all pictures, shard-0001.jsonl and so on, submit.slurm, kubernetes.yaml,
-and parallel.sh. What smalti batch takes may be given here and is handed on. docs/cluster.md tells more.
+A plan is a folder with a list of all pictures (manifest.jsonl), one list for each shard (shard-0001.jsonl and so on), and \
+scripts that run the shards: submit.slurm, kubernetes.yaml and parallel.sh. The flags of smalti batch may be given here; the scripts \
+hand them on. docs/cluster.md explains more.
 
 Examples:
   smalti plan photos -o mosaics --shards 16 --style mosaic
@@ -58,22 +62,22 @@ Examples:
   smalti merge mosaics -o all.jsonl --manifest plan/manifest.jsonl";
 
 #[derive(Clone, Debug, Args)]
-#[command(after_long_help = AFTER_HELP)]
+#[command(after_long_help = AFTER_HELP, override_usage = USAGE)]
 #[command(group = ArgGroup::new("cut").required(true).args(["shards", "per_shard", "minutes"]))]
 pub(crate) struct PlanArgs {
-    /// Folder of the plan; made if it is not there
+    /// Folder for the plan; made if it is not there
     #[arg(long, value_name = "FOLDER", default_value = "plan", help_heading = "Plan")]
     pub into: PathBuf,
-    /// Cut the batch into so many shards
+    /// Cut the batch into this many shards
     #[arg(long, value_name = "N", value_parser = values::count, help_heading = "Plan")]
     pub shards: Option<u64>,
-    /// Cut the batch into shards of about so many pictures
+    /// Cut the batch into shards of about this many pictures
     #[arg(long, value_name = "ITEMS", value_parser = values::count, help_heading = "Plan")]
     pub per_shard: Option<u64>,
-    /// Cut the batch into shards of about so many minutes of work
+    /// Cut the batch into shards of about this many minutes of work
     #[arg(long, value_name = "M", value_parser = values::number, help_heading = "Plan")]
     pub minutes: Option<f64>,
-    /// How long a picture takes on a machine of the cluster: 800ms, 4s, 2m [default: guessed from some of the pictures]
+    /// How long one picture takes on the cluster, such as 4s [default: measured here on a few]
     #[arg(long, value_name = "TIME", value_parser = values::duration, help_heading = "Plan")]
     pub picture_time: Option<Duration>,
     /// Replace files in the folder of the plan that no plan wrote, or that were changed since
@@ -191,8 +195,9 @@ fn manifest(rows: &[&ManifestRow]) -> Result<String> {
 }
 
 fn work_folder() -> Result<String> {
-    let folder = std::env::current_dir()
-        .map_err(|error| Error::Usage(format!("the current folder cannot be read ({error}); change to another one")))?;
+    let folder = std::env::current_dir().map_err(|error| {
+        Error::Usage(format!("the current folder cannot be read, since {}; change to another one", in_words(&error)))
+    })?;
     text(&folder)
 }
 

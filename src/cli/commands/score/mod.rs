@@ -26,16 +26,15 @@ Columns (more in --json: MAE_R, MAE_G, MAE_B, EDGE_P, EDGE_R, width, height):
   MAE   their mean; RMSE the root of the mean square; PSNR = 20 log10(255 / RMSE) dB
   SSIM  structural similarity, 7x7 px window, mean of the channels; 1 is identical
   GMSM  mean similarity of luma gradients, 1 is identical; GMSD its standard deviation
-  EDGE  how well edges are kept: F1 of the Canny edges of luma, found again within 2 px;
-        EDGE_P is precision, EDGE_R is recall
+  EDGE  how well edges are kept: F1 of the Canny edges of luma, found again within 2 px; EDGE_P is precision, EDGE_R is recall
 
-With --flicker, REF and OUT are folders of frames in natural order, and the columns are, over all neighbouring frames:
+With --flicker, REF and OUT are folders of frames in natural order, and the columns are of all neighbouring frames:
   FLICKER  mean of |OUT[t] - OUT[t-1]| over the channels of pixels of which no channel of REF changes by more than --still
   STILL    the share of such pixels
   CHANGE   mean of |(OUT[t] - OUT[t-1]) - (REF[t] - REF[t-1])| over the channels of all pixels
   SAE, MAE of OUT to REF, over all frames
 
-Exit codes: 0 all were scored, 2 none could be, 3 some could not be.
+Exit codes: 0 all were scored; 2 none could be; 3 some could not be.
 
 Examples:
   smalti evolve photo.jpg -o mosaic.png --save-target target.png
@@ -48,25 +47,25 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_long_help = AFTER_HELP)]
 pub(crate) struct ScoreArgs {
-    /// Picture to compare with, 7x7 px at least, `-` for stdin; with --flicker a folder of frames
+    /// Picture to compare with, at least 7x7 px; - reads stdin. With --flicker, a folder of frames
     #[arg(value_name = "REF", value_parser = values::input())]
     pub reference: PathBuf,
-    /// Pictures to score, of the same size, `-` for stdin; with --flicker folders of frames
+    /// Pictures to score, of the same size; - reads stdin. With --flicker, folders of frames
     #[arg(value_name = "OUT", required = true, value_parser = values::input())]
     pub pictures: Vec<PathBuf>,
-    /// Measure how much sequences of frames change where the reference does not
+    /// Measure how much frames change where those of the reference do not
     #[arg(long)]
     pub flicker: bool,
-    /// Largest change of a channel of REF, 0 to 255, of a pixel that counts as still
+    /// A pixel counts as still if no channel of REF changes by more than this, 0 to 255
     #[arg(long, value_name = "T", default_value_t = 12, requires = "flicker")]
     pub still: u8,
-    /// Reduce REF to the size of OUT first, as `evolve` reduces its input
+    /// Reduce REF to the size of each picture first, as evolve reduces its input
     #[arg(long, conflicts_with = "flicker")]
     pub fit: bool,
-    /// Print a JSON array to stdout, one object for each OUT that could be scored, instead of a table
+    /// Print a JSON array to stdout instead of a table, with one object for each scored picture
     #[arg(long)]
     pub json: bool,
-    /// Colour behind transparent pixels: black, white or RRGGBB
+    /// Colour behind transparent pixels, such as white or #f80
     #[arg(long, value_name = "COLOR", value_parser = color, default_value = "black")]
     pub background: Rgb,
 }

@@ -28,46 +28,51 @@ Examples:
   smalti timelapse run -o mosaic.png --frames 60 --hold 3 --loop 1";
 
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_long_help = EXAMPLES)]
 pub(crate) struct TimelapseArgs {
-    /// Folder of snapshots that `smalti evolve --save-run` wrote
+    /// Folder of snapshots that smalti evolve --save-run wrote
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
 
-    /// Where to write the animation: .png or .apng (lossless), .gif, and through ffmpeg .mp4 or .webm; may repeat
+    /// Animation to write: .gif .png .apng, and with ffmpeg .mp4 .webm; may repeat
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
-    /// Longer side of the frames, 1 to 65,535 px; every mosaic is drawn anew at that size [default: as evolved]
+    /// Longer side of the frames, 1 to 65,535 px [default: as evolved]
+    ///
+    /// Every mosaic is drawn anew at this size.
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Output")]
     pub output_size: Option<u64>,
-    /// Colour behind the tiles: black, white or RRGGBB; or none, except for .mp4 and .webm, which are then over black
-    /// [default: as evolved]
+    /// Colour behind the tiles, such as navy or #f80, or none [default: as evolved]
+    ///
+    /// A .mp4 or .webm cannot be transparent: instead of none, it has black.
     #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Output")]
     pub background: Option<Backdrop>,
-    /// Replace outputs that the same command would not have written
+    /// Replace files that smalti did not write, or wrote with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,
 
     /// Frames a second, 1 to 120; at most 50 in a GIF
     #[arg(long, value_name = "N", value_parser = values::count, default_value = "20", help_heading = "Time")]
     pub fps: u64,
-    /// Show at most so many of the snapshots, at least 1 [default: half of them with --spacing error, else all]
+    /// Show at most this many snapshots [default: half of them with --spacing error, else all]
     #[arg(long, value_name = "N", value_parser = values::count, help_heading = "Time")]
     pub frames: Option<u64>,
-    /// What is even from frame to frame
+    /// What grows evenly from frame to frame
     #[arg(long, value_enum, value_name = "WHAT", default_value = "error", help_heading = "Time")]
     pub spacing: Spacing,
-    /// How long the last frame is shown, 0 to 600 seconds, but no shorter than the others
+    /// How long the last frame is shown, 0 to 600 seconds
     #[arg(long, value_name = "SECONDS", value_parser = values::number, default_value_t = 1.5, help_heading = "Time")]
     pub hold: f64,
-    /// How often a .png, .apng or .gif is played, 0 to 65,535; 0 is without end
+    /// How often a .png, .apng or .gif is played, 0 to 65,535; 0 never ends
     #[arg(long = "loop", value_name = "N", value_parser = values::count, default_value = "0", help_heading = "Time")]
     pub plays: u64,
 
     #[command(flatten)]
     pub computing: ComputingArgs,
 
-    /// How to show progress on stderr; a bar needs a terminal, elsewhere it becomes plain lines
+    /// How to show progress on stderr
+    ///
+    /// A bar needs a terminal; elsewhere it becomes plain lines.
     #[arg(long, value_enum, value_name = "KIND", default_value = "auto", help_heading = "Messages")]
     pub progress: ProgressKind,
     /// Say nothing but errors

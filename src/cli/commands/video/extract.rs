@@ -20,7 +20,7 @@ use crate::cli::files::inputs::in_folder;
 use crate::cli::files::left_out::LeftOut;
 use crate::cli::film;
 use crate::cli::terminal::interrupt::Interrupt;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::output::{self, PartialFolder};
 use crate::photo;
 use crate::studio::{SOFTWARE, hexadecimal};
@@ -225,7 +225,8 @@ impl Kept<'_> {
     }
 
     fn unusable(&self, error: &io::Error) -> Error {
-        let reason = format!("cannot be used for the frames of the video ({error}); name other --populations");
+        let reason =
+            format!("cannot be used for the frames of the video, since {}; name other --populations", in_words(error));
         Error::output(self.folder, reason)
     }
 }

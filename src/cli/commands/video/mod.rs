@@ -30,7 +30,7 @@ use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::Progress;
 use crate::cli::terminal::{self, Verbosity, advice};
 use crate::cli::{film as animation, trace};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 
 /// Makes the frames and reports on them; returns the exit code of the process.
 pub(crate) fn make(args: &VideoArgs) -> ExitCode {
@@ -57,8 +57,9 @@ pub(crate) fn make(args: &VideoArgs) -> ExitCode {
 fn print_shots(options: &VideoOptions, is_json: bool) -> Result<()> {
     let interrupt = Interrupt::listen()?;
     options.computing.start_threads()?;
-    let folder = tempfile::tempdir()
-        .map_err(|error| Error::Internal(format!("there is no place for temporary files ({error})")))?;
+    let folder = tempfile::tempdir().map_err(|error| {
+        Error::Internal(format!("there is no place for temporary files, since {}", in_words(&error)))
+    })?;
     let frames = input::find(options, &folder.path().join("input"), &interrupt)?;
     plan::print_shots(&plan::plan(options, &frames.paths, &interrupt)?, is_json)
 }

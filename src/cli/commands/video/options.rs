@@ -38,60 +38,64 @@ Examples:
   smalti video frames -o mosaic --frames 120..240     # one shot, on another machine";
 
 #[derive(Clone, Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_long_help = EXAMPLES)]
 pub(crate) struct VideoArgs {
     /// Folder of frames, frames in their order, an animation (GIF, APNG, WebP), or a video that ffmpeg reads
     #[arg(value_name = "FRAMES", required = true)]
     pub inputs: Vec<PathBuf>,
 
-    /// Folder for the frames, or an animation: .gif, .png or .apng, and through ffmpeg .mp4 or .webm; may repeat
+    /// Folder for the frames, or an animation: .gif .png .apng, and with ffmpeg .mp4 .webm; may repeat
     #[arg(short, long = "output", value_name = "OUT", required_unless_present = "shots", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Format of the frames in a folder
     #[arg(long, value_enum, value_name = "FORMAT", default_value = "png", help_heading = "Output")]
     pub format: FrameFormat,
-    /// Folder that keeps the population of each frame, from which the same command goes on after an end [default:
+    /// Folder that keeps the tiles of each frame, so that the same command can go on after an interruption [default:
     /// `populations` in the folder of frames, or OUT.populations beside an animation]
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub populations: Option<PathBuf>,
-    /// Frames a second of an animation, 1 to 120; at most 50 in a GIF [default: as in the video, or 25]
+    /// Frames a second of an animation, 1 to 120 [default: as in the video, else 25]
+    ///
+    /// A GIF has at most 50.
     #[arg(long, value_name = "N", value_parser = values::count, help_heading = "Output")]
     pub fps: Option<u64>,
-    /// Replace frames and animations that are not smalti's or were made with other options
+    /// Replace files that smalti did not write, or wrote with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,
-    /// Print one line of JSON for each frame, and one for all, to stdout
+    /// Print one line of JSON for each frame to stdout, and one for all
     #[arg(long, help_heading = "Output")]
     pub json: bool,
-    /// Also write what threads and devices did when, as JSON for ui.perfetto.dev or chrome://tracing; changes no result
+    /// Write what threads and devices did at what time, to be seen in ui.perfetto.dev; the result stays the same
     #[arg(long, value_name = "FILE", help_heading = "Seeing inside")]
     pub trace: Option<PathBuf>,
-    /// Only find the shots, and print them: as a table, or with --json one line for each
+    /// Only find the shots and print them, as a table or with --json as lines of JSON
     #[arg(long, help_heading = "Output")]
     pub shots: bool,
 
-    /// Whether a frame begins with the tiles of the one before
+    /// Whether a frame begins with the tiles of the frame before it
     #[arg(long, value_enum, value_name = "WHETHER", default_value = "on", help_heading = "Sequence")]
     pub warm_start: WarmStart,
-    /// Children to evaluate for a frame that begins with the tiles of the one before (suffixes k, M) [default: a
-    /// quarter of those of a frame that begins anew]
+    /// Children to try for a frame that begins with the tiles of the frame before (500k, 2M) [default: a quarter of
+    /// --evals]
     #[arg(long, value_name = "E", value_parser = values::count, help_heading = "Sequence")]
     pub warm_evals: Option<u64>,
-    /// Mean difference of two frames, 0 to 255, above which the second begins a shot, and begins anew; or off
+    /// Begin a new shot where two frames differ by more than this on average, 0 to 255; off for never
     #[arg(long, value_name = "T", value_parser = cut, default_value_t = Limit::At(SCENE_CUT), help_heading = "Sequence")]
     pub scene_cut: Limit,
-    /// Begin anew every so many frames of a shot, at least 1 [default: never]
+    /// Begin anew after this many frames of a shot [default: never]
     #[arg(long, value_name = "K", value_parser = values::count, help_heading = "Sequence")]
     pub keyframe_every: Option<u64>,
-    /// Mean difference from what a pixel was evolved towards, 0 to 63 of 255, that is taken for noise and moves no tile
+    /// Ignore changes of a pixel that are smaller than this, 0 to 63 of 255
     #[arg(long, value_name = "T", value_parser = values::count, default_value_t = NOISE, help_heading = "Sequence")]
     pub noise: u64,
-    /// How far a tile may move from one frame to the next, up to 512 px: its centre and all of its edges; tiles that
-    /// are born are free [default: anywhere]
+    /// How far a tile may move between two frames, in px [default: anywhere]
+    ///
+    /// Up to 512 px, for its centre and each of its edges. New tiles may be anywhere.
     #[arg(long, value_name = "PX", value_parser = leash, help_heading = "Sequence")]
     pub max_tile_move: Option<Leash>,
-    /// Only the frames from A up to, but not, B, counted from 0; A begins anew, and if it begins a shot, these frames
-    /// are those of the whole run
+    /// Only make the frames from A up to B, without B, counted from 0
+    ///
+    /// Frame A begins anew. If a shot begins there, the frames are the same as in a run over all frames.
     #[arg(long, value_name = "A..B", value_parser = span, help_heading = "Sequence")]
     pub frames: Option<Span>,
 

@@ -9,7 +9,7 @@ use crate::archive::{self, Archive};
 use crate::cli::files::destination::{self, Destination, Overwrite};
 use crate::cli::files::outputs::{self, EncodedFile};
 use crate::cli::files::story;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, in_words};
 use crate::photo;
 
 /// Digits of the number in a name.
@@ -43,8 +43,9 @@ impl Store {
     /// [`Error::Output`].
     pub(super) fn create(&self) -> Result<()> {
         for folder in self.folder.iter().chain([&self.populations]) {
-            fs::create_dir_all(folder)
-                .map_err(|error| Error::output(folder, format!("cannot be created as a folder ({error})")))?;
+            fs::create_dir_all(folder).map_err(|error| {
+                Error::output(folder, format!("cannot be created as a folder, since {}", in_words(&error)))
+            })?;
             destination::sweep(folder)?;
         }
         Ok(())
