@@ -46,7 +46,9 @@ impl<G: Ground> Cells<G> {
         // All of them leave before the first comes back, so that no stack overflows. Their depths may have been spread
         // since then: those that stay get their new ones in between.
         if let Some(Changed(cells)) = &changed {
-            self.in_cells(cells, |cell| cell.lift());
+            self.in_cells(cells, |cell: &mut Cell<'_, G>| {
+                cell.lift();
+            });
         }
         let is_renumbered = self.renumber(if changed.is_some() { &NEVER } else { halt });
         if let Some(Changed(mut cells)) = changed {
@@ -54,7 +56,9 @@ impl<G: Ground> Cells<G> {
             for Member { index, fly, .. } in cells.iter_mut().flat_map(|(_, members)| members) {
                 *fly = flies[*index as usize];
             }
-            self.in_cells(&cells, |cell| cell.put_back());
+            self.in_cells(&cells, |cell: &mut Cell<'_, G>| {
+                cell.put_back();
+            });
             self.restore_fitness();
         }
         is_renumbered
