@@ -1,7 +1,7 @@
 //! The driver: gives the targets damaged files, in an order that a seed decides, and keeps those that find a fault.
 //!
-//! A fault is a panic that smalti does not turn into a refusal, an input that takes more than five seconds, or a file
-//! that is left behind. One input runs at a time. It lies in the folder of what is kept while it runs, so that it is
+//! A fault is a panic that smalti does not turn into a refusal, an input that takes more than five seconds or much
+//! memory, or a file that is left behind. One input runs at a time. It lies in the folder of what is kept while it runs, so that it is
 //! still there if the whole process dies.
 
 mod corpus;
@@ -23,6 +23,8 @@ use watch::Watch;
 
 /// An input that takes longer hangs.
 const LONGEST: Duration = Duration::from_secs(5);
+/// Inputs are so small, and so are the pictures in them, that none has a reason to take more memory.
+const PEAK_MAX_MIB: u64 = 400;
 /// Inputs of a target in a row, before the next one has its turn.
 const ROUND: u64 = 50;
 
@@ -97,11 +99,16 @@ impl Driver {
             (tally.longest, tally.longest_index) = (took, index);
         }
         let left_over = scratch::left_over();
+        let peak_mib = peak_mib().filter(|&mib| mib > PEAK_MAX_MIB);
+        if peak_mib.is_some() {
+            // The next one begins at what is taken then (proc_pid_clear_refs(5)).
+            let _ = fs::write("/proc/self/clear_refs", "5");
+        }
         // A panic leaves the file that the target itself has put there.
         let fault = match panic {
             Some(told) => Some(format!("panics at {told}")),
             None if !left_over.is_empty() => Some(format!("leaves {}", left_over.join(", "))),
-            None => None,
+            None => peak_mib.map(|_| format!("takes more than {PEAK_MAX_MIB} MiB of memory in {}", target.name)),
         };
         if !left_over.is_empty() {
             scratch::clean();

@@ -1,4 +1,4 @@
-//! How many pictures a file holds.
+//! How many pictures a file holds, and how large they say they are.
 
 use image::ImageFormat;
 
@@ -7,7 +7,7 @@ use super::tiff_directories;
 /// How many pictures a file of this format holds that follow each other, and what they are called.
 pub(super) fn count(bytes: &[u8], format: ImageFormat) -> (usize, &'static str) {
     match format {
-        ImageFormat::Gif => (in_gif(bytes), "frames"),
+        ImageFormat::Gif => (in_gif(bytes).len(), "frames"),
         ImageFormat::Png => (in_png(bytes), "frames"),
         ImageFormat::WebP => (in_webp(bytes), "frames"),
         ImageFormat::Tiff => (in_tiff(bytes), "pages"),
@@ -15,8 +15,17 @@ pub(super) fn count(bytes: &[u8], format: ImageFormat) -> (usize, &'static str) 
     }
 }
 
-/// Frames of a GIF (GIF89a): every image descriptor is one.
-fn in_gif(bytes: &[u8]) -> usize {
+/// Width and height in px of the largest frame, which in a GIF may be larger than the screen that it is shown on; `None`
+/// in other formats, whose decoders refuse that.
+pub(super) fn largest_px(bytes: &[u8], format: ImageFormat) -> Option<(u32, u32)> {
+    let number = |place: usize| bytes.get(place..place + 2).map_or(0, |two| u32::from(two[0]) | u32::from(two[1]) << 8);
+    let size_px = |place: usize| (number(place + 5), number(place + 7));
+    let places = if format == ImageFormat::Gif { in_gif(bytes) } else { Vec::new() };
+    places.into_iter().map(size_px).max_by_key(|&(width_px, height_px)| u64::from(width_px) * u64::from(height_px))
+}
+
+/// Where the frames of a GIF begin (GIF89a): every image descriptor is one.
+fn in_gif(bytes: &[u8]) -> Vec<usize> {
     const TABLE: u8 = 0x80;
     let table_bytes = |flags: u8| if flags & TABLE == 0 { 0 } else { 6 << (flags & 7) };
     let byte = |place: usize| bytes.get(place).copied();
@@ -27,18 +36,18 @@ fn in_gif(bytes: &[u8]) -> usize {
             length => place += 1 + usize::from(length),
         }
     };
-    let mut count = 0;
+    let mut frames = Vec::new();
     let mut place = 13 + byte(10).map_or(0, table_bytes);
     loop {
         let next = match byte(place) {
             Some(0x21) => after_blocks(place + 2),
             Some(0x2C) => {
-                count += 1;
+                frames.push(place);
                 byte(place + 9).and_then(|flags| after_blocks(place + 11 + table_bytes(flags)))
             }
             _ => None,
         };
-        let Some(next) = next else { return count };
+        let Some(next) = next else { return frames };
         place = next;
     }
 }
@@ -102,6 +111,16 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_frame_of_a_gif_is_found_wherever_it_is() {
+        let mut gif = photo("two_frames.gif");
+        assert_eq!(largest_px(&gif, ImageFormat::Gif), Some((63, 48)));
+        let last = *in_gif(&gif).last().expect("it has two");
+        gif[last + 5..last + 9].copy_from_slice(&[0xAE, 0x42, 0x60, 0x82]);
+        assert_eq!(largest_px(&gif, ImageFormat::Gif), Some((17_070, 33_376)));
+        assert_eq!(largest_px(&photo("animated.png"), ImageFormat::Png), None);
+    }
+
+    #[test]
     fn no_cut_or_changed_byte_leads_out_of_the_file() {
         for (name, format) in [
             ("two_frames.gif", ImageFormat::Gif),
@@ -111,6 +130,7 @@ mod tests {
             let whole = photo(name);
             for cut in 0..whole.len().min(400) {
                 count(&whole[..cut], format);
+                largest_px(&whole[..cut], format);
                 for value in [0, 1, 0x21, 0x2C, 0x80, 0xFF] {
                     let mut damaged = whole.clone();
                     damaged[cut] = value;

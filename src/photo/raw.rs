@@ -7,6 +7,7 @@ use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, GrayAlphaImage, GrayImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use image::{Limits, RgbImage, RgbaImage};
 
+use super::frames;
 use super::png_space::PngSpace;
 use crate::memory;
 
@@ -72,8 +73,13 @@ pub(super) fn by_image(bytes: &[u8], format: ImageFormat, cut_short: CutShort, m
         ImageFormat::Tiff => stored_bytes,
         _ => 0,
     };
-    let need = Need { size_px: decoder.dimensions(), stored_bytes, own_bytes: own_bytes + more_bytes };
-    need.check(format, bytes.len())?;
+    let size_px = decoder.dimensions();
+    // A frame may be larger than the screen, and takes its own memory then.
+    let largest_px = frames::largest_px(bytes, format).filter(|&frame_px| pixel_count(frame_px) > pixel_count(size_px));
+    for size_px in [Some(size_px), largest_px].into_iter().flatten() {
+        let need = Need { size_px, stored_bytes, own_bytes: own_bytes + more_bytes };
+        need.check(format, bytes.len())?;
+    }
     let mut warnings = Vec::new();
     let orientation = decoder.orientation().map_err(broken)?;
     let space = space_of(decoder.icc_profile().map_err(broken)?, &mut warnings);
@@ -247,6 +253,16 @@ mod tests {
         }
         let dense = need(8_192, 8_192).check(ImageFormat::Png, 8_192 * 8_192 / 8_256);
         assert!(dense.is_ok(), "{dense:?}");
+    }
+
+    #[test]
+    fn a_frame_that_is_larger_than_its_screen_is_held_to_the_same_limits() {
+        // A screen of 18x2 px, and a frame of 17,070x33,376 px.
+        let gif = b"GIF89a\x12\0\x02\0\x80\0\0\xFF\0\0\0\0\xFF,\0\0\0\0\xAE\x42\x60\x82\0\x02\x02\x84Q\0;";
+        for cut_short in [CutShort::Refuse, CutShort::Take] {
+            let refused = by_image(gif, ImageFormat::Gif, cut_short, 0).err().expect("it takes 2 GiB");
+            assert!(refused.contains("the picture has 17070x33376 px"), "{refused}");
+        }
     }
 
     #[test]
