@@ -161,18 +161,18 @@ enum Command {
     Evolve(Box<EvolveArgs>),
     /// Evolve many pictures
     ///
-    /// If it is interrupted, the same command goes on from there. A bad picture does not stop the others: its line in the
-    /// results tells what is wrong, and the exit code is 3.
+    /// If it is interrupted, the same command goes on from there. A bad picture does not stop the others: its line in
+    /// the results tells what is wrong, and the exit code is 3.
     Batch(Box<BatchArgs>),
     /// Evolve a video into a moving mosaic that does not flicker
     ///
-    /// Each frame begins with the tiles of the frame before it, so what holds still in the video holds still in the mosaic.
-    /// If it is interrupted, the same command goes on from there.
+    /// Each frame begins with the tiles of the frame before it, so what holds still in the video holds still in the
+    /// mosaic. If it is interrupted, the same command goes on from there.
     Video(Box<VideoArgs>),
     /// Draw saved tiles again, at any size or in another format
     ///
-    /// The tiles come from a .npz file that `smalti evolve` wrote. At the size at which they evolved, the picture is the same
-    /// one that `smalti evolve` draws.
+    /// The tiles come from a .npz file that `smalti evolve` wrote. At the size at which they evolved, the picture is
+    /// the same one that `smalti evolve` draws.
     Render(Box<RenderArgs>),
     /// Make the figures and tables of the paper from your own pictures
     ///

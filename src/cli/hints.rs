@@ -1,5 +1,5 @@
-//! What to say about a command line that makes no sense, but looks like one that does: the right flag, or the command to
-//! type instead. What has no hint here is told in clap's words.
+//! What to say about a command line that makes no sense, but looks like one that does: the right flag, or the command
+//! to type instead. What has no hint here is told in clap's words.
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -23,7 +23,7 @@ enum Right {
 }
 
 /// Flags that people try, and what they mean.
-const WRONG_FLAGS: [(&[&str], Right); 34] = [
+const WRONG_FLAGS: [(&[&str], Right); 35] = [
     (
         &["--width", "--height", "--w", "--h", "--resize", "--resolution", "--scale", "--dimensions", "--long-side"],
         Flag(
@@ -82,11 +82,12 @@ const WRONG_FLAGS: [(&[&str], Right); 34] = [
     (&["--look", "--theme", "--mode", "--type"], Flag("style", "write --style NAME: free, mosaic, paint or spray")),
     (&["--random-seed", "--rng", "--random"], Flag("seed", "write --seed S, a whole number")),
     (&["--algorithm", "--method"], Flag("scheme", "write --scheme cells or --scheme paper")),
+    (&["--resume", "--continue"], Flag("on-exists", "run the same command again: it goes on where it ended")),
+    (&["--resume", "--continue"], Flag("warm-start", "run the same command again: it goes on where it ended")),
     (
         &["--initial", "--start", "--resume", "--continue", "--from"],
         Flag("init", "write --init tiles.npz to go on from a population"),
     ),
-    (&["--resume", "--continue"], Words("run the same command again: it goes on where it ended")),
     (
         &["--out", "--outfile", "--out-file", "--output-file", "--outputs", "--dest", "--to"],
         Flag("output", "write -o FILE"),

@@ -15,6 +15,10 @@ pub fn color(text: &str) -> Option<[u8; 3]> {
         let [_, r, g, b] = u32::from_str_radix(digits, 16).ok()?.to_be_bytes();
         return Some([r, g, b]);
     }
+    if text == "rebeccapurple" {
+        // CSS has this name, and SVG does not.
+        return Some([0x66, 0x33, 0x99]);
+    }
     let is_short = is_hexadecimal && text.len() == 4 && digits.len() == 3;
     let is_name = text.bytes().all(|byte| byte.is_ascii_lowercase());
     // Nothing else that SVG knows as a colour: it may be transparent, or computed in floats.

@@ -14,7 +14,7 @@ const FLOORS_OF_CLI: [&[&str]; 8] = [
     &["args"],
     &["jobs"],
     &["list", "film", "mosaics"],
-    &["commands", "config"],
+    &["commands", "config", "help", "hints"],
 ];
 
 /// Folders whose modules do not import each other at all.

@@ -45,8 +45,9 @@ fn what_can_mean_one_thing_only_is_taken() {
         ["--patience", "10_000"],
         ["--progress", "None"],
     ] {
-        succeeds(&workshop, &[["evolve"].as_slice(), &picture, &rest].concat());
+        succeeds(&workshop, &[["evolve", "--dry-run"].as_slice(), &picture, &rest].concat());
     }
+    succeeds(&workshop, &[["evolve"].as_slice(), &picture, &["--mask", "disc, Hexagon"]].concat());
     succeeds(&workshop, &["evolve", "photo.png", "-o", "b.npz", "-n", "0.05k", "--evals", "200", "-q"]);
     succeeds(&workshop, &["render", "b.npz", "-o", "b.png", "--mask", "Flower", "--shader", "Emboss", "-q"]);
     succeeds(

@@ -48,7 +48,7 @@ const KEPT_FLAGS: [&str; 15] = [
 ];
 
 /// Clap would write one line that is wider than a terminal.
-const USAGE: &str = "smalti plan [OPTIONS] -o <DIR> <--shards N|--per-shard N|--minutes M> [IN]...";
+const USAGE: &str = "smalti plan [OPTIONS] -o DIR --shards N|--per-shard N|--minutes M [IN]...";
 
 const AFTER_HELP: &str = "\
 A plan is a folder with a list of all pictures (manifest.jsonl), one list for each shard (shard-0001.jsonl and so on), and \
