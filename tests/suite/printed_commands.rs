@@ -56,10 +56,14 @@ const STAND_INS: [(&str, &str, &str); 7] = [
         "until [ \"$1\" = -- ]; do shift; done\nshift\nsh -c \"$*\"",
     ),
     ("nvidia-smi", "needs a GPU of NVIDIA", "echo GPU-00000000-0000-0000-0000-000000000000"),
-    ("renderdoccmd", "tools/capture tests it", "while [ \"$1\" != smalti ]; do shift; done\n\"$@\""),
+    ("renderdoccmd", "tools/capture tests it; here smalti runs without it", RENDERDOCCMD),
     ("tools/read_capture.py", "needs RenderDoc's Python; tools/capture tests it", ""),
     ("tools/test", "runs this test", ""),
 ];
+
+/// All of the command that follows but `--capture FIRST+COUNT` at its end.
+const RENDERDOCCMD: &str = r#"until [ "$1" = smalti ]; do shift; done
+"${@:1:$#-2}""#;
 
 const SBATCH: &str = r#"
 script=${@: -1}
