@@ -36,10 +36,14 @@ mod layering;
 mod layout;
 mod looks;
 mod machines;
+#[cfg(unix)]
+mod manual;
 mod over_nothing;
 mod paper;
 mod paper_lanes;
 mod places;
+#[cfg(unix)]
+mod printed_commands;
 mod reference;
 mod render;
 mod scenarios;

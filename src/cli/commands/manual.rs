@@ -1,9 +1,9 @@
 //! `smalti completions` and `smalti man`: shell completions and manual pages, made from the definition of the command
 //! line.
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{ExitCode, Stdio};
 
 use clap::{Args, Command};
 use clap_complete::Shell;
@@ -26,10 +26,10 @@ pub(crate) struct CompletionsArgs {
 
 #[derive(Clone, Debug, Args)]
 #[command(
-    after_help = "Examples:\n  smalti man | man -l -\n  smalti man evolve | man -l -\n  smalti man -o ~/.local/share/man/man1"
+    after_help = "Examples:\n  smalti man\n  smalti man evolve\n  smalti man evolve > smalti-evolve.1\n  smalti man -o ~/.local/share/man/man1"
 )]
 pub(crate) struct ManArgs {
-    /// Command whose page is printed [default: that of smalti itself]
+    /// Command whose page is shown on a terminal, or else printed as troff [default: that of smalti itself]
     #[arg(value_name = "COMMAND", conflicts_with = "output")]
     pub command: Option<String>,
     /// Folder that all pages are written to instead; made if it is not there
@@ -44,7 +44,7 @@ pub(crate) fn completions(args: &CompletionsArgs, mut definition: Command) -> Ex
     terminal::exit_code(print(&script))
 }
 
-/// Prints a page or writes all of them; returns the exit code of the process.
+/// Shows or prints a page or writes all of them; returns the exit code of the process.
 pub(crate) fn man(args: &ManArgs, definition: Command) -> ExitCode {
     let pages = pages(definition);
     let done = match &args.output {
@@ -53,7 +53,7 @@ pub(crate) fn man(args: &ManArgs, definition: Command) -> ExitCode {
             let name = args.command.as_ref().map_or("smalti".to_owned(), |command| format!("smalti-{command}"));
             let page = pages.iter().find(|command| command.get_name() == name);
             let unknown = || Error::Usage(format!("{name}: there is no such command; see smalti --help"));
-            page.ok_or_else(unknown).and_then(rendered).and_then(|page| print(&page))
+            page.ok_or_else(unknown).and_then(show)
         }
     };
     terminal::exit_code(done)
@@ -76,6 +76,28 @@ fn rendered(command: &Command) -> Result<Vec<u8>> {
         .render(&mut page)
         .map_err(|error| Error::Internal(format!("no manual page: {error}")))?;
     Ok(page)
+}
+
+/// Shows a page on a terminal; prints its troff where there is none.
+fn show(command: &Command) -> Result<()> {
+    let page = rendered(command)?;
+    if !io::stdout().is_terminal() {
+        return print(&page);
+    }
+    if is_shown_by_man(&page).unwrap_or(false) {
+        return Ok(());
+    }
+    print(command.clone().render_long_help().ansi().to_string().as_bytes())
+}
+
+/// Whether `man` is there, knows what it is to do, and has shown the page.
+fn is_shown_by_man(page: &[u8]) -> io::Result<bool> {
+    let mut man = std::process::Command::new("man");
+    // No stderr: its complaints would stand above the help that comes in its stead.
+    let mut man = man.args(["-l", "-"]).stdin(Stdio::piped()).stderr(Stdio::null()).spawn()?;
+    // A pager that is left early, or a man that refuses `-l`, does not read it all: how it ends tells which it was.
+    let _ = man.stdin.take().map(|mut stdin| stdin.write_all(page));
+    Ok(man.wait()?.success())
 }
 
 fn write(pages: &[Command], folder: &Path) -> Result<()> {
