@@ -15,8 +15,8 @@ pub(super) fn count(bytes: &[u8], format: ImageFormat) -> (usize, &'static str) 
     }
 }
 
-/// Width and height in px of the largest frame, which in a GIF may be larger than the screen that it is shown on; `None`
-/// in other formats, whose decoders refuse that.
+/// Width and height in px of the largest frame, which in a GIF may be larger than the screen that it is shown on.
+/// `None` in other formats, whose decoders refuse that.
 pub(super) fn largest_px(bytes: &[u8], format: ImageFormat) -> Option<(u32, u32)> {
     let number = |place: usize| bytes.get(place..place + 2).map_or(0, |two| u32::from(two[0]) | u32::from(two[1]) << 8);
     let size_px = |place: usize| (number(place + 5), number(place + 7));
