@@ -12,7 +12,7 @@ use super::objective::{lowers_sae_alone, sae};
 use super::observer::{Observer, Seen};
 use crate::error::Result;
 use crate::model::Fly;
-use crate::model::cells::{Course, Search, Standing};
+use crate::model::cells::{Search, Standing};
 
 /// Most rounds of an epoch. After each epoch, depths are spread evenly again.
 pub const ROUNDS_PER_EPOCH: u32 = 4;
@@ -178,7 +178,7 @@ impl Drive {
             }
             None => Ok(match spent(search, &self.budget, &mut self.mark)? {
                 Some(reason) => Next::Done(reason),
-                None => Next::Advance(self.begin_epoch(standing, evals_per_round(search.course()))),
+                None => Next::Advance(self.begin_epoch(standing, search.course().evals_per_round())),
             }),
         }
     }
@@ -205,11 +205,6 @@ impl Drive {
         self.idle_epochs = if standing.evals == self.begun.evals { self.idle_epochs + 1 } else { 0 };
         (self.idle_epochs == IDLE_EPOCHS_MAX).then_some(StopReason::Dry)
     }
-}
-
-/// The most evals that a round can have: a fixed number of steps for each fly, each with all candidates.
-fn evals_per_round(course: &Course) -> u64 {
-    course.fly_count as u64 * u64::from(course.rules.steps_per_fly) * u64::from(course.rules.candidates)
 }
 
 /// Why the search ends here, if it does. `mark` tells when the objective had last fallen by a thousandth.
@@ -246,7 +241,7 @@ mod tests {
 
     use super::*;
     use crate::evolve::observer::Undisturbed;
-    use crate::model::cells::{Ask, Rules, SearchState, Stacks};
+    use crate::model::cells::{Ask, Course, Rules, SearchState, Stacks};
     use crate::model::{Guide, GuideSample, MaskSet, Target};
 
     /// A search of one white pixel. Its objective falls by a share of itself each round, and it counts its calls.

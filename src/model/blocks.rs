@@ -4,9 +4,14 @@
 //! the second its under. A birth changes only the lists of the blocks that the boxes of the dead fly and of the child
 //! touch.
 
+use rayon::prelude::*;
+
 use super::fly::Fly;
 use super::mosaic::Patch;
 use super::tile::{Canvas, Tile};
+
+/// Keys from which on it is worth to sort them on all threads.
+const KEYS_FOR_THREADS: usize = 1 << 16;
 
 /// Depth-ordered tile lists of all blocks of a canvas. Blocks are numbered row by row from the top left.
 #[derive(Clone, Debug)]
@@ -28,7 +33,12 @@ pub fn index_of(depth_key: u64) -> u32 {
 #[must_use]
 pub fn depth_order(flies: &[Fly]) -> Vec<u64> {
     let mut keys: Vec<u64> = (0..).zip(flies).map(|(index, fly)| fly.depth_key(index)).collect();
-    keys.sort_unstable();
+    // No two keys are equal, so that threads come to the same order.
+    if keys.len() < KEYS_FOR_THREADS {
+        keys.sort_unstable()
+    } else {
+        keys.par_sort_unstable()
+    }
     keys
 }
 

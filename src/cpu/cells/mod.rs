@@ -224,14 +224,15 @@ impl<G: Ground> Cells<G> {
             return None;
         }
         self.owners = owners;
-        let mut members: Vec<Vec<Member>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
-        for ((index, fly), &cell) in (0_u32..).zip(&self.flies).zip(&self.owners) {
-            if cell != NO_CELL {
-                let (step, origin) = (self.steps[index as usize], self.origins[index as usize]);
-                members[cell as usize].push(Member { index, fly: *fly, step, origin });
-            }
+        let mut indices: Vec<Vec<u32>> = (0..grid.cell_count()).map(|_| Vec::new()).collect();
+        for (index, &cell) in (0..).zip(&self.owners).filter(|(_, cell)| **cell != NO_CELL) {
+            indices[cell as usize].push(index);
         }
-        Some(members)
+        let member = |index: u32| {
+            let place = index as usize;
+            Member { index, fly: self.flies[place], step: self.steps[place], origin: self.origins[place] }
+        };
+        Some(indices.into_par_iter().map(|indices| indices.into_iter().map(member).collect()).collect())
     }
 
     /// The cell of the worst of some random pixels.

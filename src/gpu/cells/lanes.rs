@@ -27,6 +27,8 @@ const ITERATIONS_MAX: u32 = 16;
 /// Most cells that a submission to software Vulkan takes as far as their budget allows: tenths of a second of work.
 /// An iteration of more of them takes several submissions.
 const CELLS_MAX: u32 = 64;
+/// Evals that software Vulkan may lose when it is cut short: a tenth of a second of work.
+const EVALS_BETWEEN_MARKS: u64 = 20_000;
 
 /// Searches on a Vulkan device that share its dispatches. Their sizes, numbers of flies and rules may differ.
 ///
@@ -344,8 +346,11 @@ impl SearchLanes for VulkanLanes {
         self.take_back(lane)
     }
 
-    fn rounds_between_marks(&self) -> u32 {
-        if self.device.info().kind == DeviceKind::Cpu { 1 } else { u32::MAX }
+    fn rounds_between_marks(&self, lane: usize) -> u32 {
+        match self.device.info().kind {
+            DeviceKind::Cpu => (EVALS_BETWEEN_MARKS / self.course(lane).evals_per_round().max(1)).max(1) as u32,
+            _ => u32::MAX,
+        }
     }
 
     fn ask(&mut self, lane: usize, rounds: u32) -> Result<()> {

@@ -38,6 +38,12 @@ impl Course {
 }
 
 impl Course {
+    /// The most evals that a round can have: a fixed number of steps for each fly, each with all candidates.
+    #[must_use]
+    pub fn evals_per_round(&self) -> u64 {
+        self.fly_count as u64 * u64::from(self.rules.steps_per_fly) * u64::from(self.rules.candidates)
+    }
+
     /// Whether the masks' coverage is opacity. Then a pixel shows all tiles on it ([`crate::model::translucency`]),
     /// tiles have no grout, and only turning is penalised.
     #[must_use]
@@ -210,8 +216,8 @@ pub trait SearchLanes: Send {
     /// If the device fails.
     fn cut(&mut self, lane: usize) -> Result<()>;
 
-    /// Most rounds to ask for at once if they may be cut short: where a round is long, no more than one should be lost.
-    fn rounds_between_marks(&self) -> u32;
+    /// Most rounds to ask a lane for at once if they may be cut short: all of them are lost then.
+    fn rounds_between_marks(&self, lane: usize) -> u32;
 
     /// Asks for `rounds` more rounds.
     ///
@@ -280,7 +286,7 @@ impl Search for OneLane<'_> {
     fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
         let mut left = rounds;
         while left > 0 {
-            let asked = left.min(self.lanes.rounds_between_marks());
+            let asked = left.min(self.lanes.rounds_between_marks(self.lane));
             self.lanes.mark(self.lane)?;
             self.lanes.ask(self.lane, asked)?;
             while self.lanes.is_busy(self.lane) {
