@@ -112,7 +112,7 @@ fn inputs_and_times_that_cannot_be_measured_with_are_refused() {
     refused(&workshop, "bench --time soon", 2, "--time");
     refused(&workshop, "bench --input photo.png", 2, "photo.png: is 40x30 px");
     refused(&workshop, "bench --input missing.png", 2, "missing.png");
-    refused(&workshop, "bench --device nothing", 2, "nothing");
+    refused(&workshop, "bench --device nothing", 4, "name:nothing fits no device");
 }
 
 #[test]
