@@ -203,7 +203,7 @@ fn what_cannot_be_shown_is_refused_in_one_sentence() {
     std::os::unix::fs::symlink("/dev/null", workshop.path("pipe.gif")).unwrap();
     let before = workshop.files();
     for (line, code, words) in [
-        ("nowhere -o t.gif", 2, "nowhere: cannot be read as a folder"),
+        ("nowhere -o t.gif", 2, "nowhere: there is no such folder"),
         ("photo.png -o t.gif", 2, "photo.png: cannot be read as a folder"),
         ("empty -o t.gif", 2, "empty: holds no snapshots"),
         ("mixed -o t.gif", 2, "mixed: holds snapshots of more than one evolution"),

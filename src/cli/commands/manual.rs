@@ -87,7 +87,7 @@ fn show(command: &Command) -> Result<()> {
     if is_shown_by_man(&page).unwrap_or(false) {
         return Ok(());
     }
-    print(command.clone().render_long_help().ansi().to_string().as_bytes())
+    print(command.clone().render_long_help().to_string().as_bytes())
 }
 
 /// Whether `man` is there, knows what it is to do, and has shown the page.
