@@ -204,7 +204,7 @@ fn each_short_help_fits_a_page_of_80_columns_and_names_the_long_one() {
     }
     let evolve = help(&workshop, "evolve -h");
     let flags = ["-o, ", "--style", "-n, ", "--output-size", "--size", "--grout <", "--seed", "--time"];
-    let places: Vec<_> = flags.iter().map(|flag| evolve.find(&format!("{flag}"))).collect();
+    let places: Vec<_> = flags.iter().map(|flag| evolve.find(*flag)).collect();
     assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{places:?}\n{evolve}");
     assert!(evolve.contains("smalti evolve --help explains all flags"), "{evolve}");
 }
@@ -219,7 +219,7 @@ fn long_help_lists_every_flag_in_groups_with_those_of_the_paper_last() {
     for command in ["evolve", "batch", "video"] {
         let help = help(&workshop, &format!("{command} --help"));
         let is_group = |line: &&str| line.ends_with(':') && !line.starts_with(' ') && !line.starts_with("Examples");
-        let last = help.lines().filter(is_group).next_back();
+        let last = help.lines().rfind(is_group);
         assert_eq!(last, Some("Only with --scheme paper:"), "{help}");
         assert!(help.contains("--threads") && help.contains("--mitosis"), "{help}");
     }
