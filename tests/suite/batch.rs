@@ -260,7 +260,7 @@ fn what_cannot_be_meant_is_refused_before_anything_is_written() {
         ("--manifest minus.jsonl -o out", "writes files"),
         ("--manifest weird.jsonl -o out", "threads is no flag that decides a picture"),
         ("--manifest none.jsonl -o out", "no such file"),
-        ("one -o out --format gif", "must end in"),
+        ("one -o out --format gif", "a mosaic is a still picture"),
         ("one -o out --format png,.PNG", "named twice"),
         ("one -o out --name {stem}.png", "ends in .{ext}"),
         ("one -o out --shard 3/2", "expected k/n"),

@@ -88,7 +88,7 @@ fn picture_and_tiles_take_the_same_colour_of_a_palette() {
 fn looks_that_make_no_sense_are_refused_in_one_sentence() {
     let workshop = Workshop::new();
     workshop.write("empty.hex", b"\n; nothing\n");
-    workshop.write("words.hex", b"ff0000\nred\n");
+    workshop.write("words.hex", b"ff0000\nreddish\n");
     workshop.write("broken.svg", b"<svg");
     image::GrayImage::new(8, 8).save(workshop.path("black.png")).expect("the picture is written");
     for (flags, told) in [

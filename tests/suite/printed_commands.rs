@@ -51,7 +51,7 @@ const CONFIGURATION: &str = "[gallery]\nbirths = 1\n[paper]\nbirths = 20\n";
 const SIZE_PX: (u32, u32) = (24, 18);
 
 /// Programs that a test machine lacks: why, and the script that stands in for each.
-const STAND_INS: [(&str, &str, &str); 9] = [
+const STAND_INS: [(&str, &str, &str); 8] = [
     ("sbatch", "needs a cluster; here every task of the script's array runs at once", SBATCH),
     ("kubectl", "needs a cluster; here the file must be there", "test -s \"${@: -1}\""),
     ("cargo", "builds this program", ""),
@@ -64,7 +64,6 @@ const STAND_INS: [(&str, &str, &str); 9] = [
     ("nvidia-smi", "needs a GPU of NVIDIA", "echo GPU-00000000-0000-0000-0000-000000000000"),
     ("renderdoccmd", "tools/capture tests it; here smalti runs without it", RENDERDOCCMD),
     ("tools/read_capture.py", "needs RenderDoc's Python; tools/capture tests it", ""),
-    ("tools/test", "runs this test", ""),
 ];
 
 /// All of the command that follows but `--capture FIRST+COUNT` at its end.
@@ -279,10 +278,10 @@ fn follow(document: &str) {
             "toml" => {
                 scratch.workshop.write("printed.toml", smaller(&text).as_bytes());
                 // Which one a block is, the text before it says.
-                scratch.run(if before.rfind("--preset") > before.rfind("--config") {
-                    "smalti evolve photo.jpg -o of-preset.png --preset printed.toml"
-                } else {
+                scratch.run(if before.rfind("--config") > before.rfind("--preset") {
                     "smalti batch photos -o of-config --config printed.toml"
+                } else {
+                    "smalti evolve photo.jpg -o of-preset.png --preset printed.toml"
                 });
             }
             "sh" | "console" | "rust" | "python" => {}

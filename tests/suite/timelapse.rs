@@ -204,7 +204,7 @@ fn what_cannot_be_shown_is_refused_in_one_sentence() {
     let before = workshop.files();
     for (line, code, words) in [
         ("nowhere -o t.gif", 2, "nowhere: there is no such folder"),
-        ("photo.png -o t.gif", 2, "photo.png: cannot be read as a folder"),
+        ("photo.png -o t.gif", 2, "photo.png: is a file, and a timelapse needs a folder of snapshots"),
         ("empty -o t.gif", 2, "empty: holds no snapshots"),
         ("mixed -o t.gif", 2, "mixed: holds snapshots of more than one evolution"),
         ("renamed -o t.gif", 2, "000000000001.npz: is no snapshot"),
