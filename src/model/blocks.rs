@@ -35,9 +35,9 @@ pub fn depth_order(flies: &[Fly]) -> Vec<u64> {
     let mut keys: Vec<u64> = (0..).zip(flies).map(|(index, fly)| fly.depth_key(index)).collect();
     // No two keys are equal, so that threads come to the same order.
     if keys.len() < KEYS_FOR_THREADS {
-        keys.sort_unstable()
+        keys.sort_unstable();
     } else {
-        keys.par_sort_unstable()
+        keys.par_sort_unstable();
     }
     keys
 }
