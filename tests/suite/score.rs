@@ -264,7 +264,7 @@ fn without_a_reference_or_any_picture_nothing_is_scored() {
         ("low.png low.png", "low.png: the picture has 40x6 px, fewer than the 7x7"),
         ("photo.png low.png", "low.png: the picture has 40x6 px and the reference 40x30"),
         ("photo.png", "<OUT>"),
-        ("photo.png photo.png --background red", "--background"),
+        ("photo.png photo.png --background reddish", "--background"),
     ] {
         let ran = workshop.run(&format!("score {line}"));
         assert_eq!((ran.code, ran.stdout.len()), (Some(2), 0), "{line}: {}", ran.stderr);

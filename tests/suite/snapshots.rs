@@ -153,7 +153,8 @@ fn after_an_interrupted_run_the_same_command_leaves_the_folder_that_an_undisturb
     assert_eq!(status.code(), Some(75), "{messages}");
     let between: Vec<String> =
         files_in(&workshop, "run").into_keys().filter(|name| !whole.contains_key(name)).collect();
-    assert_eq!(between.len(), 1, "the end of the interrupted run is kept: {between:?}");
+    // One, unless the signal came just where a snapshot is due anyway.
+    assert!(between.len() <= 1, "only the end of the interrupted run is kept besides: {between:?}");
     workshop.write("run/202401010000.npz", b"mine");
     assert_eq!(workshop.run(&line).code, Some(0));
     let mut after = files_in(&workshop, "run");

@@ -231,8 +231,8 @@ fn names_are_read_back_and_wrong_ones_are_answered_with_all_names() {
         "there is no built-in mask `star`; there are square, border, lines, flower, disc, triangle, hexagon, brush"
     );
     assert_eq!(
-        "Flat".parse::<Shader>().unwrap_err().to_string(),
-        "there is no shader `Flat`; there are flat, template, outline, emboss, soft, hollow, negative, fade, wash"
+        "star".parse::<Shader>().unwrap_err().to_string(),
+        "there is no shader `star`; there are flat, template, outline, emboss, soft, hollow, negative, fade, wash"
     );
 }
 
