@@ -23,7 +23,7 @@ enum Right {
 }
 
 /// Flags that people try, and what they mean.
-const WRONG_FLAGS: [(&[&str], Right); 35] = [
+const WRONG_FLAGS: [(&[&str], Right); 37] = [
     (
         &["--width", "--height", "--w", "--h", "--resize", "--resolution", "--scale", "--dimensions", "--long-side"],
         Flag(
@@ -31,6 +31,11 @@ const WRONG_FLAGS: [(&[&str], Right); 35] = [
             "write --output-size PX for the longer side of what is written, and the other side follows",
         ),
     ),
+    (
+        &["--dpi", "--ppi"],
+        Flag("output-size", "write --output-size PX for the longer side, which is centimetres / 2.54 * dpi"),
+    ),
+    (&["--transparent"], Flag("background", "write --background none")),
     (
         &["--max-size", "--input-size", "--working-size"],
         Flag("size", "write --size PX for the longer side at which the picture evolves"),
