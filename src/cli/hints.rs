@@ -56,7 +56,7 @@ const WRONG_FLAGS: [(&[&str], Right); 37] = [
         Flag("tiles", "write -n N for the number of tiles"),
     ),
     (
-        &["--iterations", "--iters", "--iter", "--steps", "--generations", "--epochs", "--rounds", "--iteration", "-i"],
+        &["--iterations", "--iters", "--iter", "--steps", "--generations", "--epochs", "--rounds", "--iteration"],
         Flag("evals", "write --evals E for the number of children to try, or --time TIME for how long"),
     ),
     (
@@ -99,7 +99,7 @@ const WRONG_FLAGS: [(&[&str], Right); 37] = [
     ),
     (&["--out-dir", "--output-dir", "--outdir", "--dir", "--folder"], Flag("output", "write -o DIR")),
     (
-        &["--input", "--in", "--file", "--image", "--picture", "--photo"],
+        &["-i", "--input", "--in", "--file", "--image", "--picture", "--photo"],
         Words("name the input without a flag, right after the command"),
     ),
     (&["--recurse", "-r", "-R", "--subfolders"], Flag("recursive", "write --recursive")),

@@ -13,7 +13,7 @@ pub(crate) fn why_ended(stop: &str) -> &str {
         "evals" => "when all evals were spent",
         "births" => "when all births were made",
         "patience" => "when there was no more progress",
-        "dry" => "when no tile was useless any more",
+        "dry" => "when nothing could be changed any more",
         "target-sae" => "when the error asked for was reached",
         "time" => "when the time was up",
         "interrupted" => "early, when it was interrupted",

@@ -30,7 +30,8 @@ impl Earlier {
     /// Reads the rows of a file. What cannot be read is not known.
     pub(super) fn read(path: &Path) -> Self {
         let mut earlier = Self::default();
-        let Ok(file) = File::open(path) else { return earlier };
+        // Rows may also go into a pipe, from which nothing comes back.
+        let Some(file) = File::open(path).ok().filter(|_| path.is_file()) else { return earlier };
         let mut reader = BufReader::new(file);
         let mut line = Vec::new();
         while let Ok(1..) = reader.by_ref().take(ROW_BYTES_MAX).read_until(b'\n', &mut line) {

@@ -147,8 +147,12 @@ fn tell_stale(rows: &[ResultRow]) {
 /// The first file of a row, if files of it tell of results, and none of them of that of the row.
 fn stale_file(told: &RowParts) -> Option<&PathBuf> {
     let key = told.key.as_deref().filter(|_| told.is_success())?;
-    let stories =
-        told.output.iter().filter_map(|path| Some((path, story_of_file(&Destination::for_result(path).ok()?)?)));
+    let files = told.output.iter().filter_map(|path| Some((path, Destination::for_result(path).ok()?)));
+    let files: Vec<(&PathBuf, Destination)> = files.collect();
+    // The key of a row is that of its pictures; populations have one of their own.
+    let has_picture = files.iter().any(|(_, file)| file.is_picture());
+    let files = files.into_iter().filter(|(_, file)| file.is_picture() == has_picture);
+    let stories = files.filter_map(|(path, file)| Some((path, story_of_file(&file)?)));
     let stories: Vec<(&PathBuf, Story)> = stories.collect();
     let is_there = stories.iter().any(|(_, story)| story.is_of(key));
     stories.first().filter(|_| !is_there).map(|(path, _)| *path)

@@ -35,10 +35,11 @@ pub(super) fn again(path: &Path, told: &Map<String, Value>, input: Option<&Path>
             let hash = told.get("input_sha256").and_then(Value::as_str).unwrap_or("unknown");
             again.needs.push(("PICTURE".to_owned(), format!("the picture with the SHA-256 {hash}")));
         }
-        if is_cut_by_time(told) {
-            again.differs = Some(
-                "The clock ended it. With --evals instead of --time the tiles are the same; the metadata are not.",
-            );
+        if is_cut_short(told) {
+            again.differs = Some(match evals_until_cut(told) {
+                Some(_) => "It was ended early. With these --evals the tiles are the same; the metadata are not.",
+                None => "It was ended early, and the command may end elsewhere.",
+            });
         }
     };
     match content {
@@ -78,9 +79,14 @@ pub(super) fn again(path: &Path, told: &Map<String, Value>, input: Option<&Path>
     Some(again)
 }
 
-/// Whether the clock ended a search, whose evals were counted.
-fn is_cut_by_time(told: &Map<String, Value>) -> bool {
-    told.get("stop").and_then(Value::as_str) == Some("time") && told.contains_key("objective")
+/// Whether the clock or a signal ended it.
+fn is_cut_short(told: &Map<String, Value>) -> bool {
+    told.get("stop").and_then(Value::as_str).is_some_and(|stop| ["time", "interrupted"].contains(&stop))
+}
+
+/// The evals after which a search in cells was ended early.
+fn evals_until_cut(told: &Map<String, Value>) -> Option<u64> {
+    told.get("evals").and_then(Value::as_u64).filter(|_| is_cut_short(told) && told.contains_key("objective"))
 }
 
 /// The object of this name, or one without entries.
@@ -93,21 +99,22 @@ impl Again {
     fn flags(&mut self, recipe: &Map<String, Value>, told: &Map<String, Value>) -> String {
         let first = FIRST.iter().filter_map(|name| recipe.get_key_value(*name));
         let others = recipe.iter().filter(|(name, _)| !FIRST.contains(&name.as_str()));
+        let cut = evals_until_cut(told);
         let mut text = String::new();
-        for (name, value) in first.chain(others) {
-            let (name, value) = match name.as_str() {
-                "time" if is_cut_by_time(told) => ("evals", told.get("evals").unwrap_or(value)),
-                "evals" if is_cut_by_time(told) => continue,
-                name => (name, value),
-            };
-            text += &self.flag(name, value);
+        for (name, value) in first.chain(others).filter(|(name, _)| is_flag(name)) {
+            if cut.is_none() || !["time", "evals"].contains(&name.as_str()) {
+                text += &self.flag(name, value);
+            }
+        }
+        if let Some(evals) = cut {
+            text += &format!(" --evals {evals}");
         }
         text
     }
 
     fn flag(&mut self, name: &str, value: &Value) -> String {
         let typed = match (name, value) {
-            ("tiles", count) => return format!(" -n {}", plain(count)),
+            ("tiles", count) => return format!(" -n {}", quoted(&plain(count))),
             ("preset", Value::Object(preset)) => self.file("PRESET.toml", format!("a file with\n{}", toml(preset))),
             ("palette", Value::Array(colors)) => {
                 let colors: Vec<String> = colors.iter().map(plain).collect();
@@ -146,6 +153,11 @@ impl Again {
         self.needs.push((word.clone(), what));
         word
     }
+}
+
+/// Whether a name can be that of a flag. The file may come from a stranger, and the command is there to be copied.
+fn is_flag(name: &str) -> bool {
+    name.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-')
 }
 
 /// A value without quotation marks.
@@ -190,6 +202,16 @@ mod tests {
         assert_eq!(again.commands, [command]);
         let words: Vec<&str> = again.needs.iter().map(|(word, _)| word.as_str()).collect();
         assert_eq!(words, ["PICTURE", "MASK", "MASK-2", "PALETTE.hex"]);
+    }
+
+    #[test]
+    fn a_stranger_s_file_puts_no_command_of_its_own_into_the_line() {
+        let told = told(json!({
+            "content": "mosaic",
+            "recipe": {"tiles": "1; evil #", "seed; evil #": 1, "mask": ["$(evil)"], "grout": "`evil`"}
+        }));
+        let again = again(Path::new("a.png"), &told, Some(Path::new("in.jpg"))).expect("it tells a recipe");
+        assert_eq!(again.commands, ["smalti evolve in.jpg -o a.png -n '1; evil #' --grout '`evil`' --mask '$(evil)'"]);
     }
 
     #[test]

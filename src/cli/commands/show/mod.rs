@@ -66,6 +66,7 @@ fn show_file(args: &ShowArgs) -> Result<bool> {
             "file": args.file.display().to_string(),
             "commands": again.as_ref().map(|again| &again.commands),
             "needs": needs.collect::<Map<String, Value>>(),
+            "differs": again.as_ref().and_then(|again| again.differs),
             "input_matches": is_of_input,
             "told": told,
         }))?;
@@ -117,7 +118,7 @@ fn text(file: &Path, told: &Map<String, Value>, again: Option<&Again>, input: Op
         row("tiles", HumanCount(tiles).to_string());
     }
     if let Some(sae) = number("sae") {
-        let mean = size.map(|(width_px, height_px)| sae as f64 / (width_px * height_px * 3).max(1) as f64);
+        let mean = size.map(|(width_px, height_px)| sae as f64 / (width_px as f64 * height_px as f64 * 3.0).max(1.0));
         let mean = mean.filter(|_| word("transparent_sha256").is_none());
         let mean = mean.map_or_else(String::new, |mean| format!(", mean error {mean:.2} of 255 per channel"));
         row("score", format!("SAE {}{mean}", HumanCount(sae)));
