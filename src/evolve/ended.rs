@@ -34,6 +34,11 @@ pub struct Ending {
 }
 
 impl Ending {
+    fn of_search(search: &mut dyn Search, stop: StopReason) -> Result<Self> {
+        let (standing, sae) = (search.standing(), objective::sae(search)?);
+        Ok(Self { stop, sae, tally: Tally::Cells(standing) })
+    }
+
     /// Whether the work ran to its end, rather than being interrupted.
     #[must_use]
     pub fn is_complete(&self) -> bool {
@@ -114,8 +119,20 @@ impl Ended {
     /// # Errors
     /// If the device fails.
     pub fn of_search(search: &mut dyn Search, stop: StopReason) -> Result<Self> {
-        let (standing, sae) = (search.standing(), objective::sae(search)?);
-        let SearchState { flies, fitness, .. } = search.read_back()?;
-        Ok(Self { ending: Ending { stop, sae, tally: Tally::Cells(standing) }, flies, fitness })
+        let ending = Ending::of_search(search, stop)?;
+        search.read_back().map(|state| Self::of_state(ending, state))
+    }
+
+    /// As [`Ended::of_search`], of a search that nobody needs any more.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn of_last(mut search: Box<dyn Search>, stop: StopReason) -> Result<Self> {
+        let ending = Ending::of_search(&mut *search, stop)?;
+        search.into_state().map(|state| Self::of_state(ending, state))
+    }
+
+    fn of_state(ending: Ending, SearchState { flies, fitness, .. }: SearchState) -> Self {
+        Self { ending, flies, fitness }
     }
 }

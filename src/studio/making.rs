@@ -67,7 +67,7 @@ pub(crate) fn evolve(
                 instruments.note_stand_in(&reason);
             }
             let stop = cells::run(&mut *search, first.as_deref(), &budget, observer)?;
-            Ended::of_search(&mut *search, stop)?
+            Ended::of_last(search, stop)?
         }
         Task::Paper(task) => {
             let mut engine = engine(device, task, instruments)?;

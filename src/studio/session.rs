@@ -197,7 +197,7 @@ impl<'d> Session<'d> {
                 if self.stop.is_none() {
                     search.renormalise()?;
                 }
-                Ended::of_search(&mut *search, stop)?
+                Ended::of_last(search, stop)?
             }
             Work::Paper(mut engine) => {
                 engine.stop(stop);

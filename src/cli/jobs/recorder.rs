@@ -115,6 +115,11 @@ impl Recorder {
     /// # Errors
     /// If the device fails.
     pub fn finish(&mut self, seen: &mut Seen<'_>) -> Result<()> {
+        // The result of a search has its depths spread, which a snapshot of the same evals may have missed. In the
+        // paper's scheme the best population is the same.
+        if matches!(seen, Seen::Search(_)) {
+            self.last = None;
+        }
         let taken = self.take(seen);
         self.close();
         taken

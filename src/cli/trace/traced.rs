@@ -120,6 +120,12 @@ impl Search for TracedSearch {
         self.search.read_back()
     }
 
+    fn into_state(self: Box<Self>) -> Result<SearchState> {
+        let Self { search, tracer } = *self;
+        let _span = tracer.frequent_span("read back");
+        search.into_state()
+    }
+
     fn sae(&mut self) -> Result<u64> {
         let _span = self.tracer.frequent_span("SAE");
         self.search.sae()

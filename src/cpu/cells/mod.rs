@@ -317,6 +317,11 @@ impl<G: Ground> Search for Cells<G> {
         Ok(SearchState { flies: self.flies.clone(), steps: self.steps.clone(), fitness })
     }
 
+    fn into_state(self: Box<Self>) -> Result<SearchState> {
+        let Self { flies, steps, fitness, .. } = *self;
+        Ok(SearchState { flies, steps, fitness: fitness.into_iter().map(AtomicI64::into_inner).collect() })
+    }
+
     fn sae(&mut self) -> Result<u64> {
         if !self.is_bare() {
             self.settle(&NEVER);

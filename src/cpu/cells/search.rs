@@ -50,6 +50,10 @@ impl Search for CpuSearch {
         self.cells.read_back()
     }
 
+    fn into_state(self: Box<Self>) -> Result<SearchState> {
+        self.cells.into_state()
+    }
+
     fn sae(&mut self) -> Result<u64> {
         self.cells.sae()
     }

@@ -160,6 +160,14 @@ pub trait Search: Send {
     /// If the device fails.
     fn read_back(&mut self) -> Result<SearchState>;
 
+    /// As [`Search::read_back`], of a search that has ended. What it holds need not be copied.
+    ///
+    /// # Errors
+    /// If the device fails.
+    fn into_state(mut self: Box<Self>) -> Result<SearchState> {
+        self.read_back()
+    }
+
     /// The SAE of the current mosaic, over all wanted pixels, without weights.
     ///
     /// # Errors

@@ -93,8 +93,7 @@ impl<'a> Shooter<'a> {
         if stop == StopReason::Interrupted {
             return Err(Error::Interrupted);
         }
-        let ended = Ended::of_search(&mut *search, stop)?;
-        drop(search);
+        let ended = Ended::of_last(search, stop)?;
         self.device.check_validation()?;
         row.evolve_ms = milliseconds(began.elapsed());
 
