@@ -8,9 +8,9 @@ use image::metadata::Orientation;
 use image::{DynamicImage, ImageFormat, ImageReader, RgbImage, RgbaImage};
 use sha2::{Digest, Sha256};
 
-use super::kinds::{Kind, READ, SIGNATURE_BYTES, kind_of};
+use super::kinds::{Coding, Kind, READ, SIGNATURE_BYTES, kind_of};
 use super::raw::{CutShort, Raw, Space, by_image, check_memory, check_size, limits};
-use super::{Photo, color, frames, from_jpeg, from_png, from_tiff, jpeg_segments, resize};
+use super::{Photo, color, frames, from_jpeg, from_jpeg_xl, from_png, from_tiff, jpeg_segments, resize};
 use crate::error::{Error, Result, in_words};
 use crate::{guard, memory};
 
@@ -137,7 +137,7 @@ impl Decoded {
         Ok(Self { raw, sha256 })
     }
 
-    fn decode(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> Result<Self, String> {
+    fn decode(bytes: &[u8], format: Coding, cut_short: CutShort) -> Result<Self, String> {
         Ok(Self { raw: decode_raw(bytes, format, cut_short)?, sha256: hex(&Sha256::digest(bytes)) })
     }
 
@@ -191,6 +191,9 @@ impl Decoded {
 #[must_use]
 pub fn decoding_bytes(path: &Path) -> u64 {
     let size = || {
+        if kind_of_file(path).ok()? == Kind::Read(Coding::JpegXl) {
+            return from_jpeg_xl::size_px(&read_picture_file(path).ok()?.1);
+        }
         let mut reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
         reader.limits(limits());
         reader.into_dimensions().ok()
@@ -237,9 +240,9 @@ pub(super) fn is_picture(path: &Path) -> Result<bool> {
 pub fn is_whole(path: &Path) -> bool {
     let Ok((format, bytes)) = read_picture_file(path) else { return false };
     let has_its_end = match format {
-        ImageFormat::Png => bytes.ends_with(&PNG_END),
-        ImageFormat::Jpeg => jpeg_segments::is_complete(&bytes),
-        ImageFormat::WebP => {
+        Coding::Image(ImageFormat::Png) => bytes.ends_with(&PNG_END),
+        Coding::Image(ImageFormat::Jpeg) => jpeg_segments::is_complete(&bytes),
+        Coding::Image(ImageFormat::WebP) => {
             let size = bytes.get(4..8).and_then(|size| size.try_into().ok()).map(u32::from_le_bytes);
             size.is_some_and(|size| u64::from(size) + 8 == bytes.len() as u64)
         }
@@ -249,7 +252,7 @@ pub fn is_whole(path: &Path) -> bool {
 }
 
 /// The format and the bytes of the file at `path`, if its first bytes show that it is a picture.
-pub(super) fn read_picture_file(path: &Path) -> Result<(ImageFormat, Vec<u8>)> {
+pub(super) fn read_picture_file(path: &Path) -> Result<(Coding, Vec<u8>)> {
     let unreadable = |error: io::Error| Error::input(path, why_unreadable(&error));
     let mut file = File::open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();
@@ -282,11 +285,12 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
 }
 
 /// The picture in `bytes` as it is stored, within the limits, or a sentence that says why there is none.
-pub(super) fn decode_raw(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> Result<Raw, String> {
+pub(super) fn decode_raw(bytes: &[u8], format: Coding, cut_short: CutShort) -> Result<Raw, String> {
     guard::decoded(|| decode_unguarded(bytes, format, cut_short))
 }
 
-fn decode_unguarded(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> Result<Raw, String> {
+fn decode_unguarded(bytes: &[u8], format: Coding, cut_short: CutShort) -> Result<Raw, String> {
+    let Coding::Image(format) = format else { return from_jpeg_xl::decode(bytes, cut_short) };
     let mut raw = match format {
         ImageFormat::Jpeg => from_jpeg::decode(bytes, cut_short),
         ImageFormat::Png => from_png::decode(bytes, cut_short),
@@ -301,7 +305,7 @@ fn decode_unguarded(bytes: &[u8], format: ImageFormat, cut_short: CutShort) -> R
 }
 
 /// The format that the bytes of a file show, or a sentence if it is none that is read.
-fn known_format(bytes: &[u8]) -> Result<ImageFormat, String> {
+fn known_format(bytes: &[u8]) -> Result<Coding, String> {
     match kind_of(bytes) {
         Kind::Read(format) => Ok(format),
         Kind::Foreign(foreign) => Err(foreign.reason()),

@@ -1,12 +1,14 @@
 //! What a file is, told by its first bytes whatever its name: a picture of a format that is read, or one of those that
 //! are not, which is named so that its owner knows what to do.
 
+use std::fmt;
+
 use image::ImageFormat;
 
 use super::camera_raw;
 
 /// The formats that are read, for messages.
-pub(super) const READ: &str = "PNG, JPEG, WebP, TIFF, BMP and GIF";
+pub(super) const READ: &str = "PNG, JPEG, JPEG XL, WebP, TIFF, BMP and GIF";
 /// Bytes at the beginning of a file that are enough to recognise its kind.
 pub(super) const SIGNATURE_BYTES: usize = 4096;
 /// Bytes in which a text shows whether it is a drawing or a web page.
@@ -16,11 +18,35 @@ const TEXT_BYTES: usize = 1024;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A picture that is read.
-    Read(ImageFormat),
+    Read(Coding),
     /// Something that people have pictures in, and that is not read.
     Foreign(Foreign),
     /// Anything else.
     Other,
+}
+
+/// How the pixels of a file that is read are coded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coding {
+    /// In a format that `image` knows.
+    Image(ImageFormat),
+    /// In JPEG XL.
+    JpegXl,
+}
+
+impl From<ImageFormat> for Coding {
+    fn from(format: ImageFormat) -> Self {
+        Self::Image(format)
+    }
+}
+
+impl fmt::Display for Coding {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Image(format) => write!(out, "{format:?}"),
+            Self::JpegXl => out.write_str("JPEG XL"),
+        }
+    }
 }
 
 /// A kind of file that is not read.
@@ -45,8 +71,8 @@ const fn foreign(name: &'static str, advice: &'static str) -> Kind {
 }
 
 const HEIF: &str = "convert it first, for instance with heif-convert";
+// No crate reads it without C, is maintained, and tells how a picture is turned and what its colours mean.
 const AVIF: &str = "convert it first, for instance with avifdec";
-const JPEG_XL: &str = "convert it first, for instance with djxl";
 const MAGICK: &str = "convert it first, for instance with ImageMagick";
 const EDITOR: &str = "export it as PNG first, for instance with GIMP";
 const VIDEO: &str = "take a picture out of it first, for instance with ffmpeg";
@@ -59,8 +85,8 @@ const BEGINNINGS: &[(&[u8], Kind)] = &[
     (b"\xFF\xD8\xFF\xF7", foreign("JPEG-LS", MAGICK)),
     (b"\xFF\x4F\xFF\x51", foreign("JPEG 2000", MAGICK)),
     (b"\0\0\0\x0CjP  \r\n\x87\n", foreign("JPEG 2000", MAGICK)),
-    (b"\0\0\0\x0CJXL \r\n\x87\n", foreign("JPEG XL", JPEG_XL)),
-    (b"\xFF\x0A", foreign("JPEG XL", JPEG_XL)),
+    (b"\0\0\0\x0CJXL \r\n\x87\n", Kind::Read(Coding::JpegXl)),
+    (b"\xFF\x0A", Kind::Read(Coding::JpegXl)),
     (b"II\xBC\x01", foreign("JPEG XR", MAGICK)),
     (b"8BPS", foreign("PSD", EDITOR)),
     (b"gimp xcf", foreign("XCF", EDITOR)),
@@ -125,12 +151,12 @@ pub fn kind_of(bytes: &[u8]) -> Kind {
     }
     if is_tiff(bytes) {
         let raw = camera_raw::name(bytes).map(|name| foreign(name, RAW));
-        return raw.unwrap_or(Kind::Read(ImageFormat::Tiff));
+        return raw.unwrap_or(Kind::Read(ImageFormat::Tiff.into()));
     }
     match image::guess_format(bytes) {
         Ok(
             format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Bmp | ImageFormat::Gif),
-        ) => Kind::Read(format),
+        ) => Kind::Read(format.into()),
         Ok(ImageFormat::Pnm) => foreign("Netpbm", MAGICK),
         _ if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"AVI ") => foreign("a video (AVI)", VIDEO),
         _ => of_text(bytes),
@@ -194,7 +220,6 @@ mod tests {
             (b"\0\0\0\x18ftypcrx \0\0\0\x01crx isom", "camera raw (CR3)"),
             (b"\0\0\0\x18ftypisom\0\0\0\x01isommp42", "a video (MP4 or QuickTime)"),
             (b"\0\0\0\x10ftypqt  \0\0\0\0", "a video (MP4 or QuickTime)"),
-            (b"\xFF\x0A\xFA\x1F", "JPEG XL"),
             (b"8BPS\0\x01", "PSD"),
             (b"%PDF-1.7 and more", "PDF"),
             (b"junk before\n%PDF-1.4", "PDF"),
@@ -220,7 +245,10 @@ mod tests {
             (b"BM\x10\0", ImageFormat::Bmp),
             (b"RIFF\x10\0\0\0WEBPVP8L", ImageFormat::WebP),
         ] {
-            assert_eq!(kind_of(bytes), Kind::Read(format), "{format:?}");
+            assert_eq!(kind_of(bytes), Kind::Read(format.into()), "{format:?}");
+        }
+        for bytes in [&b"\xFF\x0A\xFA\x1F"[..], b"\0\0\0\x0CJXL \r\n\x87\n\0\0"] {
+            assert_eq!(kind_of(bytes), Kind::Read(Coding::JpegXl));
         }
         for bytes in [&b""[..], b"hello", b"#!/bin/sh", b"ff0000\n00ff00\n", b"GIMP Palette\n", &[0; 64]] {
             assert_eq!(kind_of(bytes), Kind::Other, "{bytes:?}");

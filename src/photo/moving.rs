@@ -9,6 +9,7 @@ use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, DynamicImage, Frames, ImageError, ImageFormat, ImageResult};
 
 use super::decode::{decode_raw, read_picture_file};
+use super::kinds::{Coding, Kind};
 use super::raw::{CutShort, Space, why_undecodable};
 use super::{Background, Metadata, Photo, color, encode_png, encode_png_with_alpha, frames};
 use crate::error::{Error, Result};
@@ -29,10 +30,9 @@ pub struct MovingFrame {
 /// # Errors
 /// [`Error::Input`] if the file cannot be read.
 pub fn frame_count(path: &Path) -> Result<usize> {
-    let is_moving = |format| matches!(format, ImageFormat::Gif | ImageFormat::Png | ImageFormat::WebP);
     match super::kind_of_file(path)? {
-        super::Kind::Read(format) if is_moving(format) => {
-            let (format, bytes) = read_picture_file(path)?;
+        Kind::Read(Coding::Image(format @ (ImageFormat::Gif | ImageFormat::Png | ImageFormat::WebP))) => {
+            let (_, bytes) = read_picture_file(path)?;
             Ok(frames::count(&bytes, format).0)
         }
         _ => Ok(1),
@@ -47,6 +47,7 @@ pub fn take_apart(path: &Path, mut each: impl FnMut(MovingFrame) -> Result<()>) 
     let (format, bytes) = read_picture_file(path)?;
     // Compares what it takes with limits and free memory, and tells what the colours mean.
     let space = decode_raw(&bytes, format, CutShort::Refuse).map_err(|reason| Error::input(path, reason))?.space;
+    let Coding::Image(format) = format else { return Err(Error::input(path, "is not taken apart into frames")) };
     let broken = |error: ImageError| Error::input(path, why_undecodable(format, error));
     for frame in opened(&bytes, format).map_err(broken)? {
         let frame = frame.map_err(broken)?;

@@ -8,6 +8,7 @@ use image::{ColorType, DynamicImage, GrayAlphaImage, GrayImage, ImageDecoder, Im
 use image::{Limits, RgbImage, RgbaImage};
 
 use super::frames;
+use super::kinds::Coding;
 use super::png_space::PngSpace;
 use crate::memory;
 
@@ -117,9 +118,17 @@ fn what_is_there<D: ImageDecoder>(
     image.ok_or_else(|| broken_sentence(format, "it has not as many samples as its size says"))
 }
 
+/// How the warning about a picture that is read in part begins.
+const IN_PART: &str = "is cut short; what is missing is ";
+
 /// The warning about a picture that is read in part.
 pub(super) fn taken_in_part(rest: &str) -> String {
-    format!("is cut short; what is missing is {rest}")
+    format!("{IN_PART}{rest}")
+}
+
+/// Whether these warnings are about a picture that is read in part.
+pub(crate) fn is_in_part(warnings: &[String]) -> bool {
+    warnings.iter().any(|warning| warning.starts_with(IN_PART))
 }
 
 /// What the profile of a picture says, if there is one that may be applied.
@@ -156,8 +165,9 @@ impl Need {
 
     /// Refuses a picture over the limits, one that a file of so many bytes cannot hold, and one that needs more memory
     /// than is free.
-    pub(super) fn check(&self, format: ImageFormat, file_bytes: usize) -> Result<(), String> {
+    pub(super) fn check(&self, format: impl Into<Coding>, file_bytes: usize) -> Result<(), String> {
         check_size(self.size_px)?;
+        let format = format.into();
         let (width_px, height_px) = self.size_px;
         let count = pixel_count(self.size_px);
         if count > FREE_PIXEL_COUNT && count > (file_bytes as u64).saturating_mul(densest(format)) {
@@ -182,12 +192,12 @@ pub(super) fn check_memory(needed: u64, free: Option<u64>, what: &str) -> Result
 
 /// More pixels than a byte of such a file stands for, whatever it shows. A large picture of fewer bytes was not made by
 /// a camera or a program that draws, but to fill memory.
-fn densest(format: ImageFormat) -> u64 {
+fn densest(format: Coding) -> u64 {
     match format {
         // A block of 8x8 px takes a bit at least.
-        ImageFormat::Jpeg => 512,
+        Coding::Image(ImageFormat::Jpeg) => 512,
         // A code of 12 bits stands for 4,096 px at most.
-        ImageFormat::Gif => 4096,
+        Coding::Image(ImageFormat::Gif) => 4096,
         // Deflate packs 1,032 bytes into one, each of them eight pixels.
         _ => 1 << 14,
     }
@@ -229,8 +239,8 @@ pub(super) fn why_undecodable(format: ImageFormat, error: ImageError) -> String 
     }
 }
 
-pub(super) fn broken_sentence(format: ImageFormat, detail: &str) -> String {
-    format!("the {format:?} data is broken or cut short ({detail}); get the file or save it again")
+pub(super) fn broken_sentence(format: impl Into<Coding>, detail: &str) -> String {
+    format!("the {} data is broken or cut short ({detail}); get the file or save it again", format.into())
 }
 
 #[cfg(test)]

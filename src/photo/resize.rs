@@ -30,6 +30,13 @@ pub fn fitted(photo: &Photo, long_side_px: u32) -> Photo {
     fit_pixels(&photo.pixels, (photo.width_px, photo.height_px), Some(long_side_px))
 }
 
+/// `photo` brought to exactly this size by Lanczos3.
+#[must_use]
+pub fn fitted_to(photo: &Photo, size_px: (u32, u32)) -> Photo {
+    let pixels = resized(&photo.pixels, (photo.width_px, photo.height_px), size_px, Channels);
+    Photo { width_px: size_px.0, height_px: size_px.1, pixels }
+}
+
 fn fit_pixels(source: &[[u8; 3]], size_px: (u32, u32), long_side_px: Option<u32>) -> Photo {
     let (width_px, height_px) = fitted_size(size_px, long_side_px);
     if (width_px, height_px) == size_px {

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use image::{DynamicImage, ImageFormat};
+use image::DynamicImage;
 
 use super::decode::{decode_raw, read_picture_file};
-use super::kinds::{Kind, kind_of};
+use super::kinds::{Coding, Kind, kind_of};
 use super::raw::CutShort;
 use super::{color, resize};
 use crate::error::{Error, Result};
@@ -38,13 +38,13 @@ pub fn decode_weights(bytes: &[u8], width_px: u32, height_px: u32) -> Result<Vec
     weights(bytes, format, (width_px, height_px), CutShort::Refuse)
 }
 
-fn weights(bytes: &[u8], format: ImageFormat, size_px: (u32, u32), cut_short: CutShort) -> Result<Vec<u8>, String> {
+fn weights(bytes: &[u8], format: Coding, size_px: (u32, u32), cut_short: CutShort) -> Result<Vec<u8>, String> {
     guard::decoded(|| weights_unguarded(bytes, format, size_px, cut_short))
 }
 
 fn weights_unguarded(
     bytes: &[u8],
-    format: ImageFormat,
+    format: Coding,
     size_px: (u32, u32),
     cut_short: CutShort,
 ) -> Result<Vec<u8>, String> {

@@ -19,9 +19,9 @@ const GZIP_SIGNATURE: [u8; 2] = [0x1F, 0x8B];
 
 /// Reads the template in the file at `path`. Its content decides the format, not its name.
 ///
-/// A picture (PNG, JPEG, WebP, TIFF, BMP or GIF) is stretched to the square whatever its aspect. If any of its pixels
-/// is transparent, its alpha becomes the template's alpha and its luma the intensity. Otherwise it is a stencil: its
-/// luma becomes both, so black is a hole. An SVG keeps its aspect and is centred; its luma becomes the intensity.
+/// A picture (PNG, JPEG, JPEG XL, WebP, TIFF, BMP or GIF) is stretched to the square whatever its aspect. If any of its
+/// pixels is transparent, its alpha becomes the template's alpha and its luma the intensity. Otherwise it is a stencil:
+/// its luma becomes both, so black is a hole. An SVG keeps its aspect and is centred; its luma becomes the intensity.
 ///
 /// Intensities are then scaled so that the brightest is 255. So a drawing in one colour, even in black, is evenly
 /// bright.
@@ -59,7 +59,7 @@ fn ink_in(bytes: &[u8], looks_like_svg: bool) -> Result<Vec<Ink>, String> {
     } else if let photo::Kind::Foreign(foreign) = photo::kind_of(bytes) {
         Err(foreign.reason())
     } else {
-        Err("not a mask that can be read; PNG, JPEG, WebP, TIFF, BMP, GIF and SVG can".to_owned())
+        Err("not a mask that can be read; PNG, JPEG, JPEG XL, WebP, TIFF, BMP, GIF and SVG can".to_owned())
     }?;
     if ink.iter().all(|ink| ink.alpha == 0) {
         let reason = "the mask is empty: nothing in it is opaque, or all of it is black; draw the tile's shape in white, or \

@@ -36,7 +36,7 @@ impl Mask {
         is_known.then(|| Self::named_or_file(name)).ok_or_else(refusal)
     }
 
-    /// The shape in a picture (PNG, JPEG, WebP, TIFF, BMP or GIF) or an SVG file.
+    /// The shape in a picture (PNG, JPEG, JPEG XL, WebP, TIFF, BMP or GIF) or an SVG file.
     ///
     /// # Errors
     /// [`Error::Input`] if the file cannot be read or draws nothing.

@@ -41,8 +41,8 @@ impl Picture {
         decoded.map(|decoded| Self { decoded }).map_err(|reason| contradiction("picture", reason))
     }
 
-    /// Reads a PNG, JPEG, WebP, TIFF, BMP or GIF file (its first frame): EXIF orientation is applied, colours are
-    /// converted to sRGB.
+    /// Reads a PNG, JPEG, JPEG XL, WebP, TIFF, BMP or GIF file (its first frame): EXIF orientation is applied, colours
+    /// are converted to sRGB.
     ///
     /// # Errors
     /// [`crate::Error::Input`] if the file cannot be read, is no such picture, is broken or cut short, is too large, or

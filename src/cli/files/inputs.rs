@@ -15,7 +15,8 @@ use crate::photo;
 /// The characters that make a name a pattern.
 const WILD: [char; 3] = ['*', '?', '['];
 /// Endings that mark the pictures of a folder, in lower case.
-const ENDINGS: [&str; 12] = ["png", "apng", "jpg", "jpeg", "jpe", "jfif", "webp", "tif", "tiff", "bmp", "dib", "gif"];
+const ENDINGS: [&str; 13] =
+    ["png", "apng", "jpg", "jpeg", "jpe", "jfif", "jxl", "webp", "tif", "tiff", "bmp", "dib", "gif"];
 
 /// A file that was found.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -63,9 +63,27 @@ fn reduced_pictures_have_the_pixels_they_always_had() {
 #[test]
 fn lossless_formats_hold_the_same_pixels() {
     let expected = load("rgb.png");
-    for name in ["rgb.bmp", "rgb.tif", "lossless.webp", "float.tif"] {
+    for name in ["rgb.bmp", "rgb.tif", "lossless.webp", "float.tif", "rgb.jxl"] {
         assert_eq!(load(name), expected, "{name}");
     }
+}
+
+#[test]
+fn jpeg_xl_holds_the_pixels_of_what_it_was_made_of() {
+    for name in ["alpha", "grey_16_bit", "animated"] {
+        let [of_png, of_jxl] = [".png", ".jxl"].map(|ending| load_with(&format!("{name}{ending}"), &GREEN).photo);
+        assert_eq!(of_jxl, of_png, "{name}");
+    }
+    let transparent = ReadOptions { background: Background::Transparent, ..GREEN };
+    let [of_png, of_jxl] = ["alpha.png", "alpha.jxl"].map(|name| load_with(name, &transparent));
+    assert_eq!((of_jxl.photo, of_jxl.transparent), (of_png.photo, of_png.transparent));
+    // A profile of its own, and a JPEG that is packed anew and turned on its side.
+    for name in ["wide_rgb.png", "turned.jpg"] {
+        let packed = format!("{}.jxl", name.split('.').next().unwrap_or_default());
+        let difference = mean_difference(&load(&packed), &load(name));
+        assert!(difference < 1.0, "{name} is off by {difference}");
+    }
+    assert_eq!(load_with("animated.jxl", &GREEN).warnings, ["the first frame of an animation is read"]);
 }
 
 /// Mean absolute difference of the channels.
@@ -79,9 +97,14 @@ fn mean_difference(a: &Photo, b: &Photo) -> f64 {
 #[test]
 fn lossy_formats_hold_nearly_the_same_pixels() {
     let expected = load("rgb.png");
-    for (name, most) in
-        [("plain.jpg", 7.0), ("progressive.jpg", 7.0), ("cmyk.jpg", 4.0), ("lossy.webp", 7.0), ("palette.png", 12.0)]
-    {
+    for (name, most) in [
+        ("plain.jpg", 7.0),
+        ("progressive.jpg", 7.0),
+        ("cmyk.jpg", 4.0),
+        ("lossy.webp", 7.0),
+        ("lossy.jxl", 7.0),
+        ("palette.png", 12.0),
+    ] {
         let difference = mean_difference(&load(name), &expected);
         assert!(difference < most, "{name} is off by {difference}");
     }
@@ -279,7 +302,7 @@ fn damaged_bytes_never_bring_the_reader_down() {
 #[test]
 fn what_is_no_picture_is_refused_with_the_formats_that_are_read() {
     for bytes in [&b"hello"[..], b"#!/bin/sh"] {
-        assert_eq!(refusal(bytes), "not a picture that can be read; PNG, JPEG, WebP, TIFF, BMP and GIF can");
+        assert_eq!(refusal(bytes), "not a picture that can be read; PNG, JPEG, JPEG XL, WebP, TIFF, BMP and GIF can");
     }
     assert_eq!(refusal(b""), "the file is empty (0 bytes); get it again");
 }

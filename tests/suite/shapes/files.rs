@@ -245,7 +245,7 @@ fn what_cannot_be_read_or_is_no_mask_is_refused() {
     let path = drawer.write("empty.png", "");
     assert_eq!(refusal(&path, read(&path)), "the file is empty (0 bytes); get it again");
     let path = drawer.write("notes.txt", "a square, please");
-    let reason = "not a mask that can be read; PNG, JPEG, WebP, TIFF, BMP, GIF and SVG can";
+    let reason = "not a mask that can be read; PNG, JPEG, JPEG XL, WebP, TIFF, BMP, GIF and SVG can";
     assert_eq!(refusal(&path, read(&path)), reason);
     let whole = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/photos/alpha.png")).unwrap();
     let path = drawer.write("cut.png", &whole[..whole.len() / 2]);
