@@ -9,6 +9,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::cli::args::typed::{Typed, one_sentence};
 use crate::cli::commands::bench::BenchArgs;
+use crate::cli::commands::check::CheckArgs;
 use crate::cli::commands::devices::DevicesArgs;
 use crate::cli::commands::evolve::EvolveArgs;
 use crate::cli::commands::gallery::GalleryArgs;
@@ -50,7 +51,7 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     command: Command,
-    /// TOML file of flags; what is typed overrides it
+    /// File with flags, in TOML; flags on the command line come before it
     #[arg(long, global = true, value_name = "FILE", env = "SMALTI_CONFIG", hide_env_values = true)]
     config: Option<PathBuf>,
     /// What was typed, and what the file of `--config` added to it.
@@ -72,7 +73,7 @@ impl Cli {
         Self::parsed(&tokens).map_err(|error| {
             if error.use_stderr() && error.kind() != ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
                 let hint = hints::of(&error, &tokens, &built);
-                terminal::error(&hint.unwrap_or_else(|| one_sentence(&error.to_string(), &command_typed())));
+                terminal::error(&hint.unwrap_or_else(|| one_sentence(&error.to_string(), &command_typed(&tokens))));
             } else {
                 // Only a closed pipe can fail here: nobody wants the rest of the help.
                 let _ = error.print();
@@ -139,6 +140,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         Command::Plan(args) => commands::plan::plan(args, &cli.typed),
         Command::Merge(args) => commands::merge::merge(args),
         Command::Video(args) => commands::video::make(args),
+        Command::Check(args) => commands::check::check(args),
         Command::Bench(args) => commands::bench::bench(args),
         Command::Completions(args) => commands::manual::completions(args, definition()),
         Command::Man(args) => commands::manual::man(args, definition()),
@@ -146,10 +148,10 @@ pub fn run(cli: &Cli) -> ExitCode {
 }
 
 /// The command that was typed, with its subcommand if that is one.
-fn command_typed() -> String {
-    let first = std::env::args().nth(1).unwrap_or_default();
-    let is_known = Cli::command().get_subcommands().any(|command| command.get_name() == first);
-    if is_known { format!("smalti {first}") } else { "smalti".to_owned() }
+fn command_typed(tokens: &[OsString]) -> String {
+    let whole = Cli::command();
+    let command = tokens.get(1).and_then(|first| whole.find_subcommand(first));
+    command.map_or_else(|| "smalti".to_owned(), |command| format!("smalti {}", command.get_name()))
 }
 
 #[derive(Debug, Subcommand)]
@@ -203,6 +205,10 @@ enum Command {
     ///
     /// Tells which pictures failed, and which are missing.
     Merge(MergeArgs),
+    /// Check that a Vulkan device gives the same numbers as the CPU
+    ///
+    /// Run it once on a new graphics card or driver: it takes less than a minute.
+    Check(CheckArgs),
     /// Measure how fast this machine evolves pictures
     Bench(BenchArgs),
     /// Print what a shell needs to complete commands and flags

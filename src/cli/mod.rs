@@ -16,6 +16,7 @@
 //! on stderr; stdout carries data only.
 
 mod args;
+mod built_in;
 mod command_line;
 mod commands;
 mod config;

@@ -7,7 +7,7 @@ use crate::sources::{Source, code, ends_of, is_word_char, source, sources};
 
 /// The floors of the command line, lowest first.
 const FLOORS_OF_CLI: [&[&str]; 8] = [
-    &["values"],
+    &["built_in", "values"],
     &["terminal"],
     &["files"],
     &["trace"],

@@ -10,6 +10,7 @@ mod bench;
 mod canary;
 mod cells;
 mod cells_vulkan;
+mod check;
 mod circles;
 mod cli;
 mod cli_cells;

@@ -130,7 +130,10 @@ impl Computing {
 }
 
 /// Opens a device, with the pipelines that an earlier run cached for it.
-fn select(request: &DeviceRequest, validation: Validation) -> Result<Device> {
+///
+/// # Errors
+/// As [`studio::select`].
+pub(crate) fn select(request: &DeviceRequest, validation: Validation) -> Result<Device> {
     studio::select(request, validation, Some(&pipelines::keeper()))
 }
 

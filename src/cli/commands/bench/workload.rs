@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::cli::built_in;
 use crate::cli::terminal::{self, Verbosity};
 use crate::error::{Error, Result};
-use crate::model::cells::random::hash;
-use crate::model::{Rgb, Scene, Target};
+use crate::model::{Scene, Target};
 use crate::photo::{self, Loaded, Photo, ReadOptions};
 use crate::studio::{self, Recipe, Work, default_fly_count};
 
@@ -28,10 +28,7 @@ impl Pictures {
     /// # Errors
     /// Never, as its size is valid.
     pub(super) fn built_in() -> Result<Self> {
-        let [small, large] = SIDES_PX.map(|side_px| {
-            let places = (0..side_px).flat_map(|y| (0..side_px).map(move |x| (x, y)));
-            Target::new(side_px, side_px, places.map(|(x, y)| painted(x, y, side_px)).collect())
-        });
+        let [small, large] = SIDES_PX.map(|side_px| built_in::picture(side_px, [side_px; 2]));
         Ok(Self { name: "built-in".to_owned(), targets: [Arc::new(small?), Arc::new(large?)] })
     }
 
@@ -54,26 +51,6 @@ impl Pictures {
         let small = target(photo::fitted(&photo, SIDES_PX[0]))?;
         Ok(Self { name: sha256, targets: [small, target(photo)?] })
     }
-}
-
-/// A pixel of the built-in picture: a fading sky, a disc, a ring, slanted bars, and noise on half of it.
-fn painted(x: u32, y: u32, side_px: u32) -> Rgb {
-    // Coordinates are scaled to a width of 1,024 px, so that both sizes show the same.
-    let [u, v] = [x, y].map(|place| ((2 * place + 1) * 512 / side_px) as i32);
-    let square_to = |x: i32, y: i32| (u - x) * (u - x) + (v - y) * (v - y);
-    let is_barred = u + 2 * v > 1_900 && (u - v / 2).rem_euclid(96) < 40;
-    let base = if square_to(340, 330) < 210 * 210 {
-        [230, 90 + v / 8, 40]
-    } else if (150 * 150..200 * 200).contains(&square_to(740, 420)) {
-        [240, 230, 200 - u / 10]
-    } else if is_barred {
-        [20, 60 + u / 20, 50]
-    } else {
-        [u / 6, 120 + v / 10, 220 - v / 6]
-    };
-    let amplitude = if u > 512 { 24 } else { 4 };
-    let noise = ((hash(y * side_px + x) >> 16) as i32 % amplitude) - amplitude / 2;
-    base.map(|channel| (channel + noise).clamp(0, 255) as u8)
 }
 
 /// The default number of tiles of a picture.
