@@ -33,7 +33,20 @@ struct Short {
 const SHORT: [Short; 9] = [
     Short {
         command: "evolve",
-        flags: &["output", "style", "tiles", "output-size", "size", "grout", "seed", "time"],
+        flags: &[
+            "output",
+            "style",
+            "tiles",
+            "output-size",
+            "size",
+            "grout",
+            "seed",
+            "time",
+            "colors",
+            "palette",
+            "background",
+            "force",
+        ],
         example: "photo.jpg -o mosaic.png --style mosaic -n 4000 --output-size 2048",
     },
     Short {

@@ -8,6 +8,8 @@ use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use self::Right::{Flag, Words};
+use crate::cli::values::quoted;
+use crate::evolve::style::Style;
 
 /// Endings of pictures, in lower case.
 const PICTURES: [&str; 11] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif", "heic", "avif", "jxl"];
@@ -23,7 +25,7 @@ enum Right {
 }
 
 /// Flags that people try, and what they mean.
-const WRONG_FLAGS: [(&[&str], Right); 37] = [
+const WRONG_FLAGS: [(&[&str], Right); 41] = [
     (
         &["--width", "--height", "--w", "--h", "--resize", "--resolution", "--scale", "--dimensions", "--long-side"],
         Flag(
@@ -36,6 +38,19 @@ const WRONG_FLAGS: [(&[&str], Right); 37] = [
         Flag("output-size", "write --output-size PX for the longer side, which is centimetres / 2.54 * dpi"),
     ),
     (&["--transparent"], Flag("background", "write --background none")),
+    (
+        &["--crop", "--aspect", "--aspect-ratio", "--ratio", "--fill"],
+        Words("a mosaic keeps the proportions of its picture; crop the picture first"),
+    ),
+    (
+        &["--quality", "--jpeg-quality", "--jpg-quality"],
+        Words("a .jpg is written at quality 92; for a smaller file write .webp, or a smaller --output-size"),
+    ),
+    (
+        &["--frame", "--page"],
+        Words("the first frame or page of a picture is read; for all frames of an animation there is smalti video"),
+    ),
+    (&["-s"], Flag("style", "write --style NAME for the look, --size PX for how large it evolves, or --seed S")),
     (
         &["--max-size", "--input-size", "--working-size"],
         Flag("size", "write --size PX for the longer side at which the picture evolves"),
@@ -153,10 +168,15 @@ pub(super) fn of(error: &clap::Error, tokens: &[OsString], whole: &Command) -> O
         )),
         (ErrorKind::UnknownArgument, Some(command)) => {
             let argument = text(ContextKind::InvalidArg)?;
+            let place = |word: &str| tokens.iter().position(|token| token == word);
+            if place(&argument).is_some_and(|place_of_it| Some(place_of_it) < place(command.get_name())) {
+                let name = command.get_name();
+                return Some(format!("{argument} stands before the command; write smalti {name} first, then the rest"));
+            }
             let is_flag = argument.starts_with('-');
             if is_flag { no_flag(&argument, command, whole) } else { surplus(&argument, command, tokens) }
         }
-        (ErrorKind::InvalidValue, Some(command)) => {
+        (ErrorKind::InvalidValue | ErrorKind::ValueValidation, Some(command)) => {
             no_value(&text(ContextKind::InvalidArg)?, &text(ContextKind::InvalidValue)?, command)
         }
         (ErrorKind::MissingRequiredArgument, Some(command)) => {
@@ -178,6 +198,8 @@ fn no_command(word: &str) -> Option<String> {
         format!("is no command; for a video write smalti video {typed} -o mosaic.mp4")
     } else if path.is_file() {
         format!("is no command; for a picture write smalti evolve {typed} -o mosaic.png")
+    } else if let Some(style) = Style::NAMES.into_iter().find(|name| word.eq_ignore_ascii_case(name)) {
+        format!("is a style and no command; write smalti evolve photo.jpg -o mosaic.png --style {style}")
     } else {
         return None;
     };
@@ -200,17 +222,26 @@ fn no_flag(flag: &str, command: &Command, whole: &Command) -> Option<String> {
     let others: Vec<String> = whole
         .get_subcommands()
         .filter(|other| has(other, long))
-        .map(|other| format!("smalti {}", other.get_name()))
+        .map(|other| other.get_name().to_owned())
         .take(3)
         .collect();
-    let others = if others.is_empty() { None } else { Some(others.join(" or ")) };
-    others.map(|others| format!("smalti {name} has no {flag}, which is a flag of {others}; see smalti {name} --help"))
+    let others = match others.as_slice() {
+        [] => return None,
+        [only] => only.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    };
+    Some(format!("smalti {name} has no {flag}, which is a flag of smalti {others}; see smalti {name} --help"))
 }
 
 /// One argument more than the command takes.
 fn surplus(argument: &str, command: &Command, tokens: &[OsString]) -> Option<String> {
     let input = first_argument(command, tokens)?;
     let [first, second] = [&input, argument].map(quoted);
+    if command.get_name() == "show" {
+        return Some(format!(
+            "smalti show tells of one file; whether it was made of {argument} tells smalti show {first} --input {second}"
+        ));
+    }
     let (name, takes) = match command.get_name() {
         "evolve" => ("evolve", "picture"),
         "render" => ("render", "population"),
@@ -230,6 +261,12 @@ fn surplus(argument: &str, command: &Command, tokens: &[OsString]) -> Option<Str
 /// A value that means something elsewhere.
 fn no_value(flag: &str, value: &str, command: &Command) -> Option<String> {
     let is_moving = ["gif", "apng"].iter().chain(&VIDEOS).any(|ending| value.eq_ignore_ascii_case(ending));
+    let is_color = |word: &str| !word.is_empty() && crate::studio::color(word.trim()).is_ok();
+    if flag.starts_with("--colors") && value.split(',').all(is_color) {
+        let told = "--colors takes a number of colours; to name them, write them into a file, one a line, and that \
+                    file as --palette FILE";
+        return Some(told.to_owned());
+    }
     if command.get_name() == "video" && flag.starts_with("--format") && is_moving {
         let ending = value.to_lowercase();
         return Some(format!(
@@ -241,6 +278,12 @@ fn no_value(flag: &str, value: &str, command: &Command) -> Option<String> {
 
 /// A command without an output.
 fn no_output(missing: &str, command: &Command, tokens: &[OsString]) -> Option<String> {
+    if command.get_name() == "score" {
+        let reference = quoted(&first_argument(command, tokens).unwrap_or_else(|| "photo.jpg".to_owned()));
+        return Some(format!(
+            "<OUT> is missing; name what to compare with it, as in smalti score {reference} mosaic.png --fit"
+        ));
+    }
     let (name, output) = match command.get_name() {
         name @ ("evolve" | "render") => (name, "mosaic.png"),
         name @ ("batch" | "video") => (name, "mosaics"),
@@ -277,16 +320,6 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
     ending.is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
-/// A word as a shell takes it for one.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || "-_./~+,:@%=".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', r"'\''"))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
@@ -304,12 +337,5 @@ mod tests {
                 assert!(!wrong.contains(&format!("--{right}").as_str()), "{right}: {words}");
             }
         }
-    }
-
-    #[test]
-    fn a_word_is_quoted_only_where_a_shell_needs_it() {
-        assert_eq!(quoted("in/a-b.png"), "in/a-b.png");
-        assert_eq!(quoted("my photo.png"), "'my photo.png'");
-        assert_eq!(quoted("it's"), r"'it'\''s'");
     }
 }

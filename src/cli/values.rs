@@ -34,13 +34,13 @@ pub(crate) fn side_px(flag: &str, px: u64) -> Result<u32> {
     in_range(flag, px, 1..=u64::from(TARGET_SIDE_MAX_PX)).map(|px| px as u32)
 }
 
-/// A whole number, as `40000`, `40_000`, `40k`, `2.5k` or `2M`.
+/// A whole number, as `40000`, `40_000`, `40,000`, `40k`, `2.5k` or `2M`.
 pub(crate) fn count(text: &str) -> Result<u64, String> {
     let (digits, zeros) = match text.strip_suffix(['k', 'K']) {
         Some(digits) => (digits, 3),
         None => text.strip_suffix('M').map_or((text, 0), |digits| (digits, 6)),
     };
-    decimal(digits, zeros).ok_or_else(|| {
+    decimal(digits, zeros).or_else(|| in_thousands(text)).ok_or_else(|| {
         // A small m is a thousandth elsewhere, or minutes.
         let is_small_m = text.strip_suffix('m').is_some_and(|digits| decimal(digits, 6).is_some());
         if is_small_m {
@@ -49,6 +49,13 @@ pub(crate) fn count(text: &str) -> Result<u64, String> {
         }
         "expected a whole number such as 500, 40k or 2M".to_owned()
     })
+}
+
+/// The number whose digits commas part in groups of three.
+fn in_thousands(text: &str) -> Option<u64> {
+    let (first, groups) = text.split_once(',')?;
+    let is_well_parted = (1..=3).contains(&first.len()) && groups.split(',').all(|group| group.len() == 3);
+    if is_well_parted { whole(&text.replace(',', "")) } else { None }
 }
 
 /// The number that is written with or without decimals, times ten to the power of `zeros`, if that is whole. Single `_`
@@ -99,12 +106,16 @@ pub(crate) fn seed(text: &str) -> Result<u64, String> {
     whole(text).ok_or_else(|| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
+fn positive(time: Duration) -> Result<Duration, String> {
+    if time.is_zero() { Err("expected a time longer than 0".to_owned()) } else { Ok(time) }
+}
+
 /// A duration: seconds, or numbers with units, as `90`, `30s`, `1.5m`, `1min` or `1h30m`.
 pub(crate) fn duration(text: &str) -> Result<Duration, String> {
     let wrong = || "expected a time such as 90, 30s, 2m or 1h30m".to_owned();
     let compact: String = text.to_lowercase().split_whitespace().collect();
     if let Some(seconds) = whole(text) {
-        return Ok(Duration::from_secs(seconds));
+        return positive(Duration::from_secs(seconds));
     }
     let mut rest = compact.as_str();
     let mut total = Duration::ZERO;
@@ -125,7 +136,7 @@ pub(crate) fn duration(text: &str) -> Result<Duration, String> {
         total = total.checked_add(Duration::from_millis(part_ms)).ok_or_else(wrong)?;
         rest = tail;
     }
-    if compact.is_empty() { Err(wrong()) } else { Ok(total) }
+    if compact.is_empty() { Err(wrong()) } else { positive(total) }
 }
 
 /// A number with at most three decimals, in thousandths.
@@ -164,6 +175,8 @@ mod tests {
         assert_eq!(count("2.5k"), Ok(2_500));
         assert_eq!(count("0.25M"), Ok(250_000));
         assert_eq!(count("1_000_000"), Ok(1_000_000));
+        assert_eq!(count("2,500"), Ok(2_500));
+        assert_eq!(count("12,345,678"), Ok(12_345_678));
         assert_eq!(count("18446744073709551615"), Ok(u64::MAX));
         for text in [
             "",
@@ -214,6 +227,8 @@ mod tests {
             "1..5s",
             "1.s",
             "1_0s",
+            "0",
+            "0ms",
             "99999999999999999999s",
             "9999999999999999999h",
         ] {

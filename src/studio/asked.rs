@@ -21,6 +21,7 @@ use crate::model::cells::rules::ColorSource;
 use crate::model::fly::UNITS_PER_PX;
 use crate::model::operators::Rotation;
 use crate::model::{Backdrop, Blend};
+use crate::photo;
 use crate::shapes::Shader;
 
 /// What stands for the bytes of a file whose name decides nothing.
@@ -60,6 +61,7 @@ pub(super) fn asked(settings: &Settings, job: &Job, resized_px: Option<u32>) -> 
             Backdrop::Transparent => job.is_bare.then(|| "none".to_owned()),
         }),
     );
+    tell(&mut told, "lenient", photo::is_in_part(&job.warnings).then_some(true));
     tell(&mut told, "time", settings.time_limit.map(|limit| format!("{}ms", limit.as_millis())));
     tell(&mut told, OUTPUT_SIZE, resized_px);
     tell(&mut told, "seed", Some(job.scheme.seed()));

@@ -70,6 +70,6 @@ pub(crate) use self::memory::{drawing_bytes, estimate_bytes};
 pub(crate) use self::preset::Preset;
 pub(crate) use self::presets::{PaperPreset, Shaders};
 pub(crate) use self::provenance::{KEYWORD, Provenance, Provenances, SOFTWARE, Told, picture_metadata, without_header};
-pub(crate) use self::settings::{SchemeSettings, Settings};
+pub(crate) use self::settings::{LONG_SIDE_PX, SchemeSettings, Settings};
 pub(crate) use self::text_file::{SETTINGS_BYTES_MAX, read_text, text_of, toml_mistake};
 pub(crate) use self::words::{backdrop, color, color_count, grout_color};

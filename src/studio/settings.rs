@@ -15,7 +15,7 @@ use crate::model::{Backdrop, Blend};
 use crate::photo::CutShort;
 
 /// Longer side in px that pictures are reduced to.
-pub(super) const LONG_SIDE_PX: u64 = 512;
+pub(crate) const LONG_SIDE_PX: u64 = 512;
 
 /// How to evolve.
 #[derive(Clone, Debug)]

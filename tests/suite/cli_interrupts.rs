@@ -1,7 +1,8 @@
 //! Signals: the first ends the evolution in order, the second Ctrl-C ends the process at once.
 
 use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, Command, ExitStatus};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Duration;
 
 use crate::workshop::Workshop;
 
@@ -21,7 +22,7 @@ pub fn interrupted(workshop: &Workshop, line: &str, signals: &[&str]) -> (ExitSt
     for signal in signals {
         send(signal, &child);
         // So that two of a kind do not become one.
-        std::thread::sleep(std::time::Duration::from_millis(100));
+        std::thread::sleep(Duration::from_millis(100));
     }
     messages.read_to_string(&mut text).unwrap();
     (child.wait().unwrap(), text)
@@ -119,4 +120,32 @@ fn a_partial_table_makes_room_for_the_whole_one_and_no_partial_one_replaces_a_wh
     assert_eq!(names.map(|name| workshop.read(name)), whole);
     assert_eq!(interrupted(&workshop, &format!("{command} --force"), &["INT"]).0.code(), Some(75));
     assert!(all_are("partial"));
+}
+
+#[test]
+fn before_the_first_round_is_over_nothing_is_replaced() {
+    let workshop = Workshop::new();
+    workshop.write("a.png", b"made with care");
+    let line = "evolve photo.png -o a.png --force -n 300000 --save-run run --progress none -q";
+    let child = workshop.command(line).stderr(Stdio::piped()).spawn().unwrap();
+    // Snapshots begin where the first round does.
+    while !workshop.path("run/000000000000.npz").is_file() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    send("INT", &child);
+    let ended = child.wait_with_output().unwrap();
+    let messages = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(
+        (ended.status.code(), messages.as_str()),
+        (Some(75), "smalti: interrupted; run the same command again\n")
+    );
+    assert_eq!(workshop.read("a.png"), b"made with care");
+}
+
+#[test]
+fn a_time_too_short_for_a_round_is_told() {
+    let workshop = Workshop::new();
+    let ran = workshop.run("evolve photo.png -o a.png -n 300000 --time 1ms --json");
+    assert_eq!((ran.code, ran.row()["evals"].as_u64()), (Some(0), Some(0)), "{}", ran.stderr);
+    assert!(ran.stderr.contains("no round was over in that time"), "{}", ran.stderr);
 }

@@ -285,6 +285,15 @@ fn a_photo_is_reduced_to_the_mosaic_as_evolve_reduces_it() {
         ran.stdout
     };
     assert_eq!(against("large.png m.png s.png --fit"), against("target.png m.png s.png"));
+    // 90x67 px are 13x10 at that size, and 40x31 when drawn larger, which the photo alone is never reduced to.
+    let line = "evolve large.png -o larger.png -n 20 --size 13 --evals 500 --output-size 40";
+    assert_eq!(workshop.run(line).code, Some(0));
+    assert_eq!(workshop.pixels("larger.png").dimensions(), (40, 31));
+    let (rows, _) = scores(&workshop, "large.png larger.png --fit", 0);
+    assert_eq!([&rows[0]["width"], &rows[0]["height"]], [40, 31]);
+    workshop.paint("square.png", 40, 40);
+    let ran = workshop.run("score large.png square.png --fit");
+    assert!(ran.code == Some(2) && ran.stderr.contains("square.png: the picture has 40x40 px"), "{}", ran.stderr);
     let ran = workshop.run("score large.png m.png");
     assert!(ran.code == Some(2) && ran.stderr.contains("--fit reduces"), "{}", ran.stderr);
     let ran = workshop.run("score m.png large.png --fit");

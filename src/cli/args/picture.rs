@@ -1,7 +1,7 @@
 //! The flags that decide a picture: how it is read, how its tiles look, and how it evolves. All commands that evolve
 //! the user's pictures share them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
@@ -16,12 +16,12 @@ use crate::error::{Error, Result};
 use crate::evolve::style::Style;
 use crate::evolve::{ColorMode, OnDry};
 use crate::model::{Backdrop, Blend};
-use crate::studio::{Colors, Preset, Recipe, Scheme, Settings, backdrop, color_count};
+use crate::studio::{Colors, Preset, Recipe, Scheme, Settings, backdrop, color, color_count};
 
 /// The flags.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct PictureArgs {
-    /// Longer side of the written picture in px [default: as evolved]
+    /// Longer side of the written picture in px [default: that at which it evolved]
     ///
     /// The mosaic is drawn anew at this size, so its tiles stay sharp. 1 to 65,535 px.
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Output")]
@@ -142,6 +142,9 @@ impl PictureArgs {
                 "--preset {preset}: only --scheme {other} has it, and this is --scheme {this}; drop one of them"
             )));
         }
+        if let Some(path) = &self.palette {
+            check_palette_file(path)?;
+        }
         let recipe = match preset {
             Some(PresetChoice::File(path)) => {
                 places::note_flags_read(path);
@@ -202,4 +205,15 @@ impl PictureArgs {
         recipe.choices.colors = self.colors.clone().or(recipe.choices.colors);
         recipe
     }
+}
+
+/// Refuses colours in the place of a file of colours.
+fn check_palette_file(path: &Path) -> Result<()> {
+    let text = path.to_string_lossy();
+    if path.exists() || !text.split(',').all(|word| color(word.trim()).is_ok()) {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "--palette {text}: names a file of colours; write them into one, one a line, such as colors.hex"
+    )))
 }

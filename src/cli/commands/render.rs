@@ -44,7 +44,7 @@ pub(crate) struct RenderArgs {
     #[arg(value_name = "POP.npz", value_parser = values::input())]
     pub input: PathBuf,
 
-    /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; may repeat
+    /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; repeat it for more
     ///
     /// .npz, .csv and .json hold the tiles themselves. - writes a PNG to stdout.
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
@@ -56,7 +56,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, help_heading = "Output")]
     pub json: bool,
 
-    /// Longer side of the written picture, 1 to 65,535 px [default: as evolved]
+    /// Longer side of the written picture, 1 to 65,535 px [default: that at which it evolved]
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
     pub output_size: Option<u64>,
     /// Colour behind the tiles, such as navy or #f80, or none [default: as in the population]

@@ -86,6 +86,11 @@ impl Destination {
         self.content.is_raster()
     }
 
+    /// Whether the format has no place for transparency.
+    pub(crate) fn is_flat(&self) -> bool {
+        matches!(self.content, Content::Jpeg(_))
+    }
+
     /// Whether a regular file exists that would be replaced.
     pub(super) fn replaces_file(&self) -> bool {
         // Devices and pipes are not replaced.

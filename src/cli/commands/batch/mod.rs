@@ -245,6 +245,6 @@ fn print_list(items: &[Item], args: &BatchArgs) -> Result<()> {
             row.print()?;
         }
     }
-    terminal::say(&format!("{} pictures", items.len()));
+    terminal::say(&words::counted(items.len() as u64, "picture"));
     Ok(())
 }

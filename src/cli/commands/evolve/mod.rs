@@ -23,11 +23,12 @@ use crate::cli::jobs::watch::Watchers;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::{self, Verbosity, advice, aside};
 use crate::cli::trace::{self, Capture, CaptureRange, TraceArgs};
-use crate::error::Result;
+use crate::cli::values::quoted;
+use crate::error::{Error, Result};
 use crate::evolve::Ending;
 use crate::model::Rgb;
 use crate::photo::{self, Photo};
-use crate::studio::{Device, Job, Provenance, picture_metadata, without_header};
+use crate::studio::{Device, Job, LONG_SIDE_PX, Provenance, picture_metadata, without_header};
 
 /// Evolves one picture and reports on it; returns the exit code of the process.
 pub(crate) fn evolve(args: &EvolveArgs) -> ExitCode {
@@ -86,6 +87,7 @@ impl Run<'_> {
         let Self { options, interrupt, row } = self;
         let EvolveOptions { picture, files, mode, computing } = &*options;
         computing.start_threads()?;
+        check_input(&picture.input)?;
         check_places(options)?;
         let device = {
             let _span = picture.tracer.span("open device");
@@ -123,6 +125,10 @@ impl Run<'_> {
         let evolved = row.note_evolution(prepared.evolve(picture, &device, &mut watchers, keep))?;
         let began = Instant::now();
         let ending = evolved.ending;
+        // What was made before is worth more than nothing.
+        if !ending.is_complete() && ending.evals() == 0 {
+            return Err(Error::Interrupted);
+        }
         let status = if ending.is_complete() { Status::Complete } else { Status::Partial };
         write(options, &prepared, evolved, interrupt, &mut row.output)?;
         // If snapshots could not be written, that is reported after the result has been saved.
@@ -135,6 +141,19 @@ impl Run<'_> {
         }
         Ok(())
     }
+}
+
+/// Refuses what cannot be one picture, with the command that takes it.
+fn check_input(input: &Path) -> Result<()> {
+    let text = input.to_string_lossy();
+    let reason = if input.is_dir() {
+        format!("is a folder; for all pictures in it write smalti batch {} -o mosaics", quoted(&text))
+    } else if text.contains("://") && !input.exists() {
+        "is an address, and smalti reads no network; save the picture first, and name its file".to_owned()
+    } else {
+        return Ok(());
+    };
+    Err(Error::input(input, reason))
 }
 
 /// Checks, before anything is read, that all files can be written, and that none is written twice or is an input.
@@ -250,6 +269,22 @@ fn say_kept(options: &PictureOptions, path: &Path) {
 fn say_notes(job: &Job, options: &PictureOptions, device: &Device) {
     for warning in &job.warnings {
         terminal::say(&format!("smalti: {}: {warning}", options.input.display()));
+    }
+    let longer_px = job.original_size_px.0.max(job.original_size_px.1);
+    let asked_px = options.settings.long_side_px;
+    if asked_px > longer_px && u64::from(asked_px) != LONG_SIDE_PX {
+        terminal::say(&format!(
+            "smalti: --size {asked_px} changes nothing, since {} has {longer_px} px; --output-size {asked_px} draws the \
+             mosaic larger",
+            options.input.display()
+        ));
+    }
+    let flat = options.outputs.iter().find(|output| output.is_flat());
+    if let Some(flat) = flat.filter(|_| job.is_bare || job.target.transparent().is_some()) {
+        terminal::say(&format!(
+            "smalti: {} cannot be transparent, so what is will be black; write a .png or .webp, or choose a --background",
+            flat.path.display()
+        ));
     }
     computing::say_device(device);
 }

@@ -29,11 +29,11 @@ Examples:
 #[derive(Clone, Debug, Args)]
 #[command(after_long_help = EVOLVE_EXAMPLES)]
 pub(crate) struct EvolveArgs {
-    /// Picture to evolve: PNG, JPEG, WebP, TIFF, BMP or GIF; - reads it from stdin
+    /// Picture to evolve: PNG, JPEG, JPEG XL, WebP, TIFF, BMP or GIF; - reads it from stdin
     #[arg(value_name = "IN", value_parser = values::input())]
     pub input: PathBuf,
 
-    /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; may repeat
+    /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; repeat it for more
     ///
     /// .npz, .csv and .json hold the tiles themselves; smalti render draws a .npz again. - writes a PNG to stdout.
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
@@ -41,7 +41,7 @@ pub(crate) struct EvolveArgs {
     /// Also write the picture that the mosaic imitates, at the size at which it evolves, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
-    /// Also write how the error fell, as a table (.csv) or a plot (.svg); may repeat
+    /// Also write how the error fell, as a table (.csv) or a plot (.svg); repeat it for more
     #[arg(long = "curve", value_name = "FILE", help_heading = "Output")]
     pub curves: Vec<PathBuf>,
     /// Also keep about 250 snapshots of the evolution in this folder, for smalti timelapse

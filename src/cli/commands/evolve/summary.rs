@@ -5,6 +5,7 @@ use indicatif::{BinaryBytes, HumanCount};
 use crate::cli::jobs::options::PictureOptions;
 use crate::cli::jobs::row::{Row, Status};
 use crate::cli::terminal::{self, Verbosity, words};
+use crate::evolve::StopReason;
 use crate::studio::{Job, SchemeSettings};
 
 /// The summary of a finished evolution: one line, and with `--verbose` all figures before it.
@@ -20,6 +21,11 @@ pub(super) fn print_summary(row: &Row, options: &PictureOptions, job: &Job) {
     let seconds = row.evolve_ms / 1e3;
     let partial = if row.status == Status::Partial { " (partial)" } else { "" };
     terminal::say(&format!("wrote {written}{partial}: {tiles}, {likeness}, {seconds:.1} s{ended}{}", warming_up(row)));
+    if stop == StopReason::Time.word() && row.evals == 0 {
+        terminal::say(
+            "no round was over in that time, so nothing is laid yet; give it a longer --time, or fewer tiles with -n",
+        );
+    }
     if row.status == Status::Partial {
         terminal::say("the same command starts over, and --init goes on from a .npz");
     }

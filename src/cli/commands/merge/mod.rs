@@ -47,7 +47,7 @@ pub(crate) struct MergeArgs {
     /// File for the rows, one for each picture; - is stdout
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Manifest whose pictures should all have a row; may repeat
+    /// Manifest whose pictures should all have a row; repeat it for more
     #[arg(long = "manifest", value_name = "FILE")]
     pub manifests: Vec<PathBuf>,
     /// Format of the output [default: by its ending, else jsonl]

@@ -18,7 +18,7 @@ use crate::cli::files::destination::{Destination, Overwrite};
 use crate::cli::files::places::{self, Inputs};
 use crate::cli::list::shard::{self, SHARD_COUNT_MAX};
 use crate::cli::list::{self, BatchArgs, Item, ManifestRow};
-use crate::cli::terminal::{self, Verbosity};
+use crate::cli::terminal::{self, Verbosity, words};
 use crate::cli::trace::Tracer;
 use crate::cli::values::{self, in_range, quoted};
 use crate::error::{Error, Result, in_words};
@@ -216,7 +216,11 @@ fn text(path: &Path) -> Result<String> {
 /// Says what was planned, how long it will take, and how to run it.
 fn tell(args: &PlanArgs, plan: &Plan, largest: usize, picture_s: Option<f64>) {
     let count = plan.shard_count;
-    terminal::say(&format!("{} pictures in {count} shards of at most {largest}", plan.item_count));
+    terminal::say(&format!(
+        "{} in {} of at most {largest}",
+        words::counted(plan.item_count as u64, "picture"),
+        words::counted(count.into(), "shard")
+    ));
     if let Some(picture_s) = picture_s {
         let shard_s = picture_s * plan.item_count as f64 / f64::from(count);
         let source =

@@ -5,6 +5,7 @@
 
 use std::fmt::Write;
 
+use crate::cli::terminal::words;
 use crate::cli::values::quoted;
 
 /// Least digits of the numbers in the names of shards.
@@ -69,7 +70,9 @@ impl Plan {
 
     fn heading(&self, how: &str) -> String {
         let version = env!("CARGO_PKG_VERSION");
-        format!("# Written by smalti {version}: {} pictures in {} shards.\n{how}", self.item_count, self.shard_count)
+        let pictures = words::counted(self.item_count as u64, "picture");
+        let shards = words::counted(self.shard_count.into(), "shard");
+        format!("# Written by smalti {version}: {pictures} in {shards}.\n{how}")
     }
 
     /// A job array of Slurm.

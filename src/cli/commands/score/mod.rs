@@ -194,7 +194,8 @@ fn score_one(reference: &Reference<'_>, path: &Path, background: Rgb) -> Result<
 /// Scores a picture against the reference at the picture's size.
 fn score_fitted(args: &ScoreArgs, path: &Path) -> Result<ScoreRow> {
     let photo = read(path, None, args.background)?;
-    let fitted = read(&args.reference, Some(photo.width_px.max(photo.height_px)), args.background)?;
+    let whole = read(&args.reference, None, args.background)?;
+    let mut fitted = photo::fitted(&whole, photo.width_px.max(photo.height_px));
     let (fitted_px, photo_px) = ((fitted.width_px, fitted.height_px), (photo.width_px, photo.height_px));
     if fitted_px.0 < photo_px.0 && fitted_px.1 < photo_px.1 {
         let reason = format!(
@@ -203,8 +204,18 @@ fn score_fitted(args: &ScoreArgs, path: &Path) -> Result<ScoreRow> {
         );
         return Err(Error::input(path, reason));
     }
+    if fitted_px != photo_px && is_rounded_otherwise(fitted_px, photo_px) {
+        fitted = photo::fitted_to(&whole, photo_px);
+    }
     let score = reference(args, &fitted)?.score(picture(&photo)).map_err(|reason| Error::input(path, reason))?;
     Ok(ScoreRow::new(path, &photo, &score))
+}
+
+/// Whether two sizes are those of one picture, of which one was reduced to few pixels on the way and drawn larger: its
+/// sides were rounded twice, and may differ by a hundredth.
+fn is_rounded_otherwise(one: (u32, u32), other: (u32, u32)) -> bool {
+    let is_near = |a: u32, b: u32| a.abs_diff(b) <= 1 + a.max(b) / 100;
+    is_near(one.0, other.0) && is_near(one.1, other.1)
 }
 
 /// Reads a picture, reduced to a longer side if one is given, and prints a warning about what was ignored in it.

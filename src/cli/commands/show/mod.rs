@@ -80,7 +80,12 @@ fn show_file(args: &ShowArgs) -> Result<bool> {
 /// Whether a file that tells `told` was made of the picture at `input`.
 fn is_of(told: &Map<String, Value>, file: &Path, input: &Path) -> Result<bool> {
     let Some(hash) = told.get("input_sha256").and_then(Value::as_str) else {
-        return Err(Error::input(file, "does not tell of which picture it was made; drop --input"));
+        let reason = if told.get("content").and_then(Value::as_str) == Some("render") {
+            "was drawn of a population; ask the .npz file whether it is of that picture"
+        } else {
+            "does not tell of which picture it was made; drop --input"
+        };
+        return Err(Error::input(file, reason));
     };
     let unreadable = |error: io::Error| Error::input(input, photo::why_unreadable(&error));
     Ok(hash_of(File::open(input).map_err(unreadable)?).map_err(unreadable)? == hash)

@@ -34,15 +34,15 @@ pub(crate) struct TimelapseArgs {
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
 
-    /// Animation to write: .gif .png .apng, and with ffmpeg .mp4 .webm; may repeat
+    /// Animation to write: .gif .png .apng, and with ffmpeg .mp4 .webm; repeat it for more
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
-    /// Longer side of the frames, 1 to 65,535 px [default: as evolved]
+    /// Longer side of the frames, 1 to 65,535 px [default: that at which it evolved]
     ///
     /// Every mosaic is drawn anew at this size.
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Output")]
     pub output_size: Option<u64>,
-    /// Colour behind the tiles, such as navy or #f80, or none [default: as evolved]
+    /// Colour behind the tiles, such as navy or #f80, or none [default: that of the snapshots]
     ///
     /// A .mp4 or .webm cannot be transparent: instead of none, it has black.
     #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Output")]

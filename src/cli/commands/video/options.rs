@@ -44,7 +44,7 @@ pub(crate) struct VideoArgs {
     #[arg(value_name = "FRAMES", required = true)]
     pub inputs: Vec<PathBuf>,
 
-    /// Folder for the frames, or an animation: .gif .png .apng, and with ffmpeg .mp4 .webm; may repeat
+    /// Folder for the frames, or an animation: .gif .png .apng, and with ffmpeg .mp4 .webm; repeat it for more
     #[arg(short, long = "output", value_name = "OUT", required_unless_present = "shots", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Format of the frames in a folder
