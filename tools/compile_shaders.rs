@@ -8,6 +8,7 @@
 #[path = "shader_manifest.rs"]
 mod shader_manifest;
 
+use std::collections::HashSet;
 use std::fs;
 use std::path::Path;
 use std::process::ExitCode;
@@ -67,5 +68,54 @@ fn compile(source: &str, stage: &str) -> Result<Vec<u8>, String> {
     options.set_warnings_as_errors();
     let artifact =
         compiler.compile_into_spirv(source, kind, stage, "main", Some(&options)).map_err(|error| error.to_string())?;
-    Ok(artifact.as_binary_u8().to_vec())
+    Ok(bytemuck::cast_slice(&without_unused_constants(artifact.as_binary())).to_vec())
+}
+
+// Operations by the numbers of the SPIR-V specification, section 3.49.
+const OP_NAME: u32 = 5;
+const OP_CONSTANT: u32 = 43;
+const OP_SPEC_CONSTANT: u32 = 50;
+const OP_SPEC_CONSTANT_COMPOSITE: u32 = 51;
+const OP_SPEC_CONSTANT_OP: u32 = 52;
+const OP_DECORATE: u32 = 71;
+const WORDS_OF_HEADER: usize = 5;
+
+/// The module without the specialisation constants that nothing uses. The compiler makes a second constant of number 0
+/// for a `gl_WorkGroupSize` that is not there, and some compilers of other languages refuse two constants of a number.
+fn without_unused_constants(module: &[u32]) -> Vec<u32> {
+    let (header, mut rest) = module.split_at(WORDS_OF_HEADER);
+    let mut operations = Vec::new();
+    while let Some(&first) = rest.first() {
+        let (operation, after) = rest.split_at((first >> 16) as usize);
+        operations.push(operation);
+        rest = after;
+    }
+    loop {
+        let used: HashSet<u32> = operations.iter().flat_map(|operation| ids_used(operation)).copied().collect();
+        let is_unused = |id: u32| !used.contains(&id);
+        let made: HashSet<u32> = operations.iter().filter_map(|operation| spec_constant(operation)).collect();
+        let before = operations.len();
+        operations.retain(|operation| match (operation[0] & 0xFFFF, &operation[1..]) {
+            (OP_NAME | OP_DECORATE, [id, ..]) => !(made.contains(id) && is_unused(*id)),
+            _ => spec_constant(operation).is_none_or(|id| !is_unused(id)),
+        });
+        if operations.len() == before {
+            return [header, &operations.concat()].concat();
+        }
+    }
+}
+
+/// The id of a specialisation constant that is a number, a composite or a result of others.
+fn spec_constant(operation: &[u32]) -> Option<u32> {
+    (OP_SPEC_CONSTANT..=OP_SPEC_CONSTANT_OP).contains(&(operation[0] & 0xFFFF)).then(|| operation[2])
+}
+
+/// The words of an operation that may be ids of others: more than are, never fewer.
+fn ids_used(operation: &[u32]) -> &[u32] {
+    match operation[0] & 0xFFFF {
+        OP_NAME | OP_DECORATE => &[],
+        OP_CONSTANT | OP_SPEC_CONSTANT => &operation[1..2],
+        OP_SPEC_CONSTANT_COMPOSITE | OP_SPEC_CONSTANT_OP => &operation[3..],
+        _ => &operation[1..],
+    }
 }

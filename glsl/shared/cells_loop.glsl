@@ -50,7 +50,8 @@ void main() {
     while (step < end) {
         bool is_removal = step >= step_count;
         uint tournaments = rule.births.place_tournament + rule.births.victim_tournament;
-        uint making = STEP_TURNS + (is_removal ? 0u : batches * (BATCH_TURNS + tournaments));
+        uint making = STEP_TURNS
+            + (is_removal ? 0u : batches * (BATCH_TURNS + tournaments) + candidates * SLOT_TURNS);
         if (!afford(making)) {
             break;
         }

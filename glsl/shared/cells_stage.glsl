@@ -16,7 +16,9 @@ layout(constant_id = 6) const uint LOCAL_SIZE = 1u;
 // 1: tiles wear masks or grout, or pixels do not all count the same.
 layout(constant_id = 7) const uint DRESSED = 1u;
 
-const uint LANES = gl_WorkGroupSize.x;
+// Invocations of the workgroup: local_size_x again, as a constant of its own. Some compilers of other languages take no
+// two constants of one number, which gl_WorkGroupSize would make.
+layout(constant_id = 11) const uint LANES = 1u;
 
 #define MASK_BINDING 12
 

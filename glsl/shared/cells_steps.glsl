@@ -31,13 +31,17 @@ struct Best {
 };
 
 const uint CANDIDATE_WORDS = 13u;
-const uint BATCH = LANES < 64u ? LANES : 64u;
-shared uint shared_candidates[BATCH * CANDIDATE_WORDS];
+// Most candidates that are made at a time.
+const uint BATCH_MAX = 64u;
+const uint BATCH = LANES < BATCH_MAX ? LANES : BATCH_MAX;
+shared uint shared_candidates[BATCH_MAX * CANDIDATE_WORDS];
 
 // What loops cost besides their turns: a loop that software Vulkan passes costs the turn that ends it, even where no
 // invocation enters it.
 const uint STEP_TURNS = 40u;
-const uint BATCH_TURNS = 12u;
+const uint BATCH_TURNS = 40u;
+// Of every candidate, also one that is invalid and is passed; then what is added for one that is evaluated.
+const uint SLOT_TURNS = 12u;
 const uint CANDIDATE_TURNS = 8u;
 
 // The cell at work; the same in all invocations.

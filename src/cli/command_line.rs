@@ -51,7 +51,7 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     command: Command,
-    /// File with flags, in TOML; flags on the command line come before it
+    /// File with flags, in TOML; flags on the command line override it
     #[arg(long, global = true, value_name = "FILE", env = "SMALTI_CONFIG", hide_env_values = true)]
     config: Option<PathBuf>,
     /// What was typed, and what the file of `--config` added to it.
@@ -207,7 +207,7 @@ enum Command {
     Merge(MergeArgs),
     /// Check that a Vulkan device gives the same numbers as the CPU
     ///
-    /// Run it once on a new graphics card or driver: it takes less than a minute.
+    /// Run it once on a new graphics card or driver.
     Check(CheckArgs),
     /// Measure how fast this machine evolves pictures
     Bench(BenchArgs),

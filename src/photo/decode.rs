@@ -73,7 +73,7 @@ pub struct Loaded {
 /// The order of the steps: decode (of an animation the first frame), ICC profile to sRGB, alpha composited on the
 /// background (unless that is transparent), 8 bits, EXIF orientation, Lanczos3 to the size asked for. The pixels
 /// are the same on every machine, except under an ICC profile that has tables and no matrix: there a processor's fused
-/// multiplications may change a channel by one.
+/// multiplications may change a channel by one. So may another system's powers and roots, in a lossy JPEG XL.
 ///
 /// # Errors
 /// [`Error::Input`] if the file cannot be read, is not one of the formats, is broken or cut short, exceeds
@@ -190,10 +190,15 @@ impl Decoded {
 /// size, or if it is over the limits.
 #[must_use]
 pub fn decoding_bytes(path: &Path) -> u64 {
+    let of_jpeg_xl = || {
+        let mut beginning = Vec::new();
+        File::open(path).ok()?.take(from_jpeg_xl::HEADER_BYTES).read_to_end(&mut beginning).ok()?;
+        from_jpeg_xl::needed(&beginning).filter(|need| check_size(need.size_px).is_ok())
+    };
+    if kind_of_file(path).is_ok_and(|kind| kind == Kind::Read(Coding::JpegXl)) {
+        return guard::caught(of_jpeg_xl).ok().flatten().map_or(0, |need| need.bytes());
+    }
     let size = || {
-        if kind_of_file(path).ok()? == Kind::Read(Coding::JpegXl) {
-            return from_jpeg_xl::size_px(&read_picture_file(path).ok()?.1);
-        }
         let mut reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
         reader.limits(limits());
         reader.into_dimensions().ok()

@@ -1,5 +1,6 @@
 //! JPEG XL files (ISO/IEC 18181), by the decoder that browsers have. Its vector code stays off: it differs between
-//! processors, and pixels must not.
+//! processors. Lossy files still go through the powers and roots of the system's library, so another system may come to
+//! a channel that is off by one.
 
 use bytemuck::cast_slice_mut;
 use image::metadata::Orientation;
@@ -15,26 +16,25 @@ use super::raw::{CutShort, Need, Raw, Space, broken_sentence, space_of, taken_in
 
 /// Samples that a small picture may have besides those of its size, for frames that are larger than it.
 const SPARE_SAMPLES: usize = 1 << 20;
-/// Bytes per pixel that the decoder keeps: planes of floats, before and after filters.
-const OWN_BYTES: u64 = 32;
+/// Bytes per pixel that the decoder keeps: planes of floats, before and after filters, and frames to refer to.
+const OWN_BYTES: u64 = 48;
+/// The same for each channel beside the colours.
+const EXTRA_BYTES: u64 = 16;
 /// Most bits of a sample that fits a byte.
 const BYTE_BITS: u32 = 8;
 
 /// The picture as it is stored, upright; of an animation the first frame.
 pub(super) fn decode(bytes: &[u8], cut_short: CutShort) -> Result<Raw, String> {
-    let (mut decoder, mut rest) = opened(bytes, None)?;
-    let info = info(&decoder)?;
-    let layout = Layout::of(&decoder, info)?;
-    let size_px = size_of(info).ok_or_else(|| broken_sentence(JpegXl, "its size is out of range"))?;
-    let stored_bytes = (layout.channels() * layout.sample_bytes()) as u64;
-    let need = Need { size_px, stored_bytes, own_bytes: OWN_BYTES + 8 * info.extra_channels.len() as u64 };
+    let (header, _) = opened(bytes, None)?;
+    let info = info(&header)?;
+    let layout = Layout::of(&header, info)?;
+    let need = need(info, &layout)?;
     need.check(JpegXl, bytes.len())?;
+    let size_px = need.size_px;
     // Frames may be larger than the picture, and are held to about its size.
     let samples = size_px.0 as usize * size_px.1 as usize * (3 + info.extra_channels.len());
     let (is_moving, extra_count) = (info.animation.is_some(), info.extra_channels.len());
-    if 2 * samples + SPARE_SAMPLES < usize::MAX / 2 {
-        (decoder, rest) = opened(bytes, Some(2 * samples + SPARE_SAMPLES))?;
-    }
+    let (mut decoder, rest) = opened(bytes, Some(samples.saturating_add(SPARE_SAMPLES)))?;
     decoder.set_pixel_format(layout.format(extra_count)).map_err(broken)?;
     let mut warnings = Vec::new();
     if is_moving {
@@ -57,14 +57,21 @@ pub(super) fn decode(bytes: &[u8], cut_short: CutShort) -> Result<Raw, String> {
     Ok(Raw { image, space, orientation: Orientation::NoTransforms, warnings })
 }
 
-/// Width and height in px of the upright picture.
-pub(super) fn size_px(bytes: &[u8]) -> Option<(u32, u32)> {
-    let (decoder, _) = opened(bytes, None).ok()?;
-    size_of(info(&decoder).ok()?)
+/// Bytes of the beginning of a file that surely hold its header, with an ICC profile.
+pub(super) const HEADER_BYTES: u64 = 32 << 20;
+
+/// What it takes to decode the picture that begins with these bytes, if that can be told.
+pub(super) fn needed(beginning: &[u8]) -> Option<Need> {
+    let (header, _) = opened(beginning, None).ok()?;
+    let info = info(&header).ok()?;
+    need(info, &Layout::of(&header, info).ok()?).ok()
 }
 
-fn size_of(info: &JxlBasicInfo) -> Option<(u32, u32)> {
-    Some((u32::try_from(info.size.0).ok()?, u32::try_from(info.size.1).ok()?))
+fn need(info: &JxlBasicInfo, layout: &Layout) -> Result<Need, String> {
+    let size_px = u32::try_from(info.size.0).ok().zip(u32::try_from(info.size.1).ok());
+    let size_px = size_px.ok_or_else(|| broken_sentence(JpegXl, "its size is out of range"))?;
+    let stored_bytes = (layout.channels() * layout.sample_bytes()) as u64;
+    Ok(Need { size_px, stored_bytes, own_bytes: OWN_BYTES + EXTRA_BYTES * info.extra_channels.len() as u64 })
 }
 
 fn info(decoder: &JxlDecoder) -> Result<&JxlBasicInfo, String> {
@@ -107,12 +114,16 @@ fn read(
             Event::BasicInfo | Event::FrameHeader => {}
             Event::NeedMoreInput { .. } if cut_short == CutShort::Take => {
                 decoder.flush_pixels(&mut buffers, None).map_err(broken)?;
-                warnings.push(taken_in_part("coarse, black or transparent"));
-                return Ok(());
+                break;
             }
             Event::NeedMoreInput { .. } => return Err(broken_sentence(JpegXl, "its end is missing")),
         }
     }
+    if samples.iter().all(|&sample| sample == 0) {
+        return Err(broken_sentence(JpegXl, "none of its pixels are there"));
+    }
+    warnings.push(taken_in_part("coarse, black or transparent"));
+    Ok(())
 }
 
 /// What the channels mean.

@@ -42,6 +42,7 @@ pub use moving::{MovingFrame, frame_count, take_apart};
 pub use palette::{COLOR_COUNT_MAX, palette_of, read_palette, reduce};
 pub(crate) use raw::is_in_part;
 pub use raw::{CutShort, PIXEL_COUNT_MAX, SIDE_MAX_PX};
+pub(crate) use resize::fitted_size;
 pub use resize::{fitted, fitted_to};
 pub use stencil::{Stencil, decode_stencil, is_picture};
 pub use webp::WEBP_SIDE_MAX_PX;

@@ -198,6 +198,8 @@ fn densest(format: Coding) -> u64 {
         Coding::Image(ImageFormat::Jpeg) => 512,
         // A code of 12 bits stands for 4,096 px at most.
         Coding::Image(ImageFormat::Gif) => 4096,
+        // A group of 1,024x1,024 px takes an entry of more than a byte in the table of contents.
+        Coding::JpegXl => 1 << 20,
         // Deflate packs 1,032 bytes into one, each of them eight pixels.
         _ => 1 << 14,
     }

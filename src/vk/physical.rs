@@ -113,8 +113,12 @@ const SUBGROUP_NAMES: [(vk::SubgroupFeatureFlags, &str); 8] = [
     (vk::SubgroupFeatureFlags::QUAD, "quad"),
 ];
 
-/// Number of storage buffers that one stage of our largest pipeline uses.
-const STORAGE_BUFFERS: u32 = 13;
+/// Limits of which some pipeline needs more than every Vulkan device has: what they are called, how much is needed, and
+/// what a device offers. A test compares the needs with the modules of the shaders.
+pub const NEEDED_LIMITS: [(&str, u32, fn(&DeviceLimits) -> u32); 2] = [
+    ("storage buffers per shader stage", 14, |limits| limits.storage_buffers_per_stage),
+    ("invocations in a workgroup", 256, |limits| limits.workgroup_invocations),
+];
 
 /// Asks the driver everything that [`DeviceInfo`] holds.
 pub(super) fn describe(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> Result<DeviceInfo> {
@@ -174,13 +178,20 @@ fn add_details(instance: &ash::Instance, handle: vk::PhysicalDevice, info: &mut 
     add_modern_properties(instance, handle, info)?;
     add_missing_features(instance, handle, &mut info.missing);
     add_missing_formats(instance, handle, &mut info.missing);
-    if info.limits.storage_buffers_per_stage < STORAGE_BUFFERS {
-        info.missing.push(format!("{STORAGE_BUFFERS} storage buffers per shader stage"));
-    }
+    info.missing.extend(missing_limits(&info.limits));
     if queue_family(instance, handle).is_none() {
         info.missing.push("a queue for graphics and compute".to_owned());
     }
     Ok(())
+}
+
+/// The limits that are too low, in words.
+fn missing_limits(limits: &DeviceLimits) -> impl Iterator<Item = String> {
+    let too_low = |(name, needed, offered): (&str, u32, fn(&DeviceLimits) -> u32)| {
+        let offered = offered(limits);
+        (offered < needed).then(|| format!("{needed} {name} (it has {offered})"))
+    };
+    NEEDED_LIMITS.into_iter().filter_map(too_low)
 }
 
 /// The first queue family for graphics and compute, and the number of valid bits of its timestamps.
@@ -333,6 +344,21 @@ mod tests {
         assert_eq!(limits(36, 1.0).ns_between((1 << 36) - 1_000, 1_000), 2_000.0);
         assert_eq!(limits(36, 1.0).ns_between(1_000, (1 << 36) - 1_000), -2_000.0);
         assert_eq!(limits(64, 0.5).ns_between(u64::MAX, 1_999_999), 1e6);
+    }
+
+    #[test]
+    fn each_limit_that_is_one_too_low_is_named_with_what_is_needed() {
+        let enough = DeviceLimits {
+            storage_buffers_per_stage: 14,
+            workgroup_invocations: 256,
+            ..limits_of(&vk::PhysicalDeviceLimits::default(), 64)
+        };
+        assert_eq!(missing_limits(&enough).count(), 0);
+        let told = |limits: &DeviceLimits| missing_limits(limits).collect::<Vec<_>>();
+        let few_buffers = DeviceLimits { storage_buffers_per_stage: 13, ..enough.clone() };
+        assert_eq!(told(&few_buffers), ["14 storage buffers per shader stage (it has 13)"]);
+        let few_invocations = DeviceLimits { workgroup_invocations: 255, ..enough };
+        assert_eq!(told(&few_invocations), ["256 invocations in a workgroup (it has 255)"]);
     }
 
     #[test]

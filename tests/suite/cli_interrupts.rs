@@ -126,10 +126,11 @@ fn a_partial_table_makes_room_for_the_whole_one_and_no_partial_one_replaces_a_wh
 fn before_the_first_round_is_over_nothing_is_replaced() {
     let workshop = Workshop::new();
     workshop.write("a.png", b"made with care");
-    let line = "evolve photo.png -o a.png --force -n 300000 --save-run run --progress none -q";
-    let child = workshop.command(line).stderr(Stdio::piped()).spawn().unwrap();
+    let line = "evolve photo.png -o a.png --force -n 900000 --save-run run --progress none -q";
+    let mut child = workshop.command(line).stderr(Stdio::piped()).spawn().unwrap();
     // Snapshots begin where the first round does.
     while !workshop.path("run/000000000000.npz").is_file() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended");
         std::thread::sleep(Duration::from_millis(5));
     }
     send("INT", &child);

@@ -84,6 +84,22 @@ fn sprayed_pictures_come_to_the_twins_state_after_every_round_in_narrow_and_wide
     });
 }
 
+/// Of many candidates most are invalid and cheap, and each still costs turns of loops, of which software Vulkan grants
+/// 65,535 and then says nothing.
+#[test]
+fn steps_of_many_candidates_stay_within_the_turns_that_software_vulkan_grants() {
+    canary::with_device(&DeviceOptions::default(), |device| {
+        for candidates in [16, 24, 64] {
+            let course = course(parrots(203, 131), 300, |rules| rules.candidates = candidates);
+            let chosen = CellShape::for_device(device.info(), &course).expect("it fits some shape");
+            let widest = CellShape { lanes: 1_024, form: CellForm::Wide, budget: 60_000 };
+            for shape in [chosen, widest] {
+                check_named_rounds(&device, Named { name: "many candidates", course: &course }, shape, 1);
+            }
+        }
+    });
+}
+
 /// Courses for what a style may ask for.
 pub fn courses() -> Vec<(&'static str, Course)> {
     let plain = |change: fn(&mut Rules)| course(parrots(80, 66), 110, change);

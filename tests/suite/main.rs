@@ -39,6 +39,7 @@ mod looks;
 mod machines;
 #[cfg(unix)]
 mod manual;
+mod modules;
 mod over_nothing;
 mod paper;
 mod paper_lanes;

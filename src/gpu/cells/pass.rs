@@ -25,7 +25,7 @@ const ITEMS_PER_GROUP: u64 = 64;
 pub(super) struct Variant {
     is_translucent: bool,
     pub shape: CellShape,
-    /// Specialisation constants 2 to 8.
+    /// Specialisation constants 2 to 8; 0 and 11 are the invocations of a workgroup.
     constants: [u32; 7],
 }
 
@@ -48,7 +48,7 @@ impl Variant {
     }
 
     fn specialization(&self) -> Vec<(u32, u32)> {
-        let shape = [(0, self.shape.lanes), (1, self.shape.form as u32)];
+        let shape = [(0, self.shape.lanes), (11, self.shape.lanes), (1, self.shape.form as u32)];
         shape.into_iter().chain((2..).zip(self.constants)).collect()
     }
 }

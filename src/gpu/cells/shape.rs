@@ -101,7 +101,8 @@ impl CellShape {
         let side = u64::from(plan.largest_side_px(rules));
         let own = (across * down).min(side * side / u64::from(self.lanes) + across + down + 1);
         let tournaments = u64::from(rules.births.place_tournament + rules.births.victim_tournament);
-        let making = 2 * 40 + u64::from(rules.candidates.div_ceil(self.lanes.min(64))) * (12 + tournaments);
+        let batches = u64::from(rules.candidates.div_ceil(self.lanes.min(64)));
+        let making = 2 * 40 + batches * (40 + tournaments) + 12 * u64::from(rules.candidates);
         let side = plan.cell_side_px;
         let both = ((2 * width).min(side).min(plan.width_px), (2 * height).min(side).min(plan.height_px));
         let exchange = |inner: u64| 3 + 3 * patches(both, 2).1 + turns(patches(both, 2), inner);

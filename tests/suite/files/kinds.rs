@@ -88,7 +88,11 @@ fn a_picture_that_is_cut_short_is_refused_unless_what_is_there_is_asked_for() {
         let whole = load_with(name, &LENIENT).photo;
         assert_eq!((photo.width_px, photo.height_px), (whole.width_px, whole.height_px));
         assert!(warnings.iter().any(|warning| warning.starts_with("is cut short")), "{name}: {warnings:?}");
+        assert!(photo.pixels.iter().any(|&pixel| pixel != [0; 3]), "{name}: something of it is there");
     }
+    let bytes = fs::read(photo_path("rgb.jxl")).expect("it is there");
+    fs::write(file.path(), &bytes[..24]).expect("it can be written");
+    assert!(read(file.path(), &LENIENT).is_err(), "no pixel of it is there");
     assert_eq!(load_with("rgb.png", &LENIENT), load_with("rgb.png", &ReadOptions::default()));
 }
 
@@ -100,6 +104,10 @@ fn evolve_takes_a_picture_that_is_cut_short_if_it_is_lenient() {
     assert_eq!(ran.code, Some(2), "{}", ran.stderr);
     let ran = workshop.run("evolve cut.jpg -o o.png -n 20 --evals 200 --lenient");
     assert!(ran.code == Some(0) && ran.stderr.contains("cut.jpg: is cut short"), "{}", ran.stderr);
+    let shown = workshop.run("show o.png");
+    assert!(String::from_utf8_lossy(&shown.stdout).contains(" --lenient"), "the command makes it again");
+    assert_eq!(workshop.run("score cut.jpg cut.jpg").code, Some(2));
+    assert_eq!(workshop.run("score cut.jpg cut.jpg --lenient").code, Some(0));
 }
 
 #[test]

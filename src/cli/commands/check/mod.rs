@@ -24,11 +24,11 @@ Each check computes the same on the device and on the CPU and compares all numbe
   fitness   the two nearest tiles of every pixel, the error, and the marginal fitness of every tile
   paper     the published algorithm, birth by birth
   search    the search in cells: tiles, step sizes, fitness and what lies on every pixel, for each style and for 1, 8 and 64
-            candidates a step, with masks, with weights, over transparent pixels
+            candidates a step, with all shapes, with colours of every kind, on a leash, with weights, over transparent pixels
   drawing   the mosaic as evolved, at another size with soft edges, and over nothing
   lanes     several pictures side by side on the device
 
-Exit codes: 0 all checks are equal; 1 some differ or failed; 4 there is no Vulkan device to check.
+Exit codes: 0 all checks are equal; 1 some differ or failed; 2 wrong usage; 4 there is no Vulkan device to check.
 --json prints one object with schema, schema_version, version, os, architecture, device, driver, equal and checks. Each check has \
 name, outcome (equal, different, failed), detail, numbers, device_ms and cpu_ms.
 
@@ -110,7 +110,6 @@ fn try_check(args: &CheckArgs) -> Result<bool> {
     let device = the_device_itself(computing.select()?, validation)?;
     let progress = Progress::new(args.progress.unless(args.quiet), verbosity);
     let checks = run_all(&device, progress)?;
-    device.check_validation()?;
     let report = Report {
         schema: "smalti-check",
         schema_version: 1,
@@ -127,6 +126,7 @@ fn try_check(args: &CheckArgs) -> Result<bool> {
     } else {
         terminal::write_stdout(table(&report).as_bytes())?;
     }
+    device.check_validation()?;
     Ok(report.equal)
 }
 
@@ -148,18 +148,17 @@ fn the_device_itself(device: Device, validation: Validation) -> Result<Device> {
     computing::select(&name.parse()?, validation)
 }
 
-/// Makes all checks. One that the device fails stops no other, unless the device is lost.
+/// Makes all checks. One that the device fails stops no other, unless the device is lost: then it is the last one.
 fn run_all(device: &Device, mut progress: Progress) -> Result<Vec<Checked>> {
     let (twin, began) = (Device::cpu(), Instant::now());
     let trials = trials::all()?;
     let mut checks = Vec::with_capacity(trials.len());
     for trial in &trials {
-        let checked = run(trial, device, &twin);
-        if let Err(error @ Error::DeviceLost { .. }) = checked {
-            progress.finish();
-            return Err(error);
+        let (checked, is_lost) = run(trial, device, &twin)?;
+        checks.push(checked);
+        if is_lost {
+            break;
         }
-        checks.push(checked?);
         let standing = ChecksDone { elapsed: began.elapsed(), done: checks.len(), all: trials.len() };
         if progress.is_due(standing.elapsed) {
             progress.show(&standing);
@@ -169,11 +168,11 @@ fn run_all(device: &Device, mut progress: Progress) -> Result<Vec<Checked>> {
     Ok(checks)
 }
 
-/// Makes a check.
+/// Makes a check; returns whether the device is lost, too.
 ///
 /// # Errors
-/// If the device is lost, or the CPU fails.
-fn run(trial: &Trial, device: &Device, twin: &Device) -> Result<Checked> {
+/// If the CPU fails.
+fn run(trial: &Trial, device: &Device, twin: &Device) -> Result<(Checked, bool)> {
     let timed = |device: &Device| {
         let began = Instant::now();
         let found = trial.run(device);
@@ -182,15 +181,16 @@ fn run(trial: &Trial, device: &Device, twin: &Device) -> Result<Checked> {
     let ((found, device_ms), (expected, cpu_ms)) = (timed(device), timed(twin));
     let expected = expected?;
     let numbers = numbers::count(&expected);
+    let is_lost = matches!(found, Err(Error::DeviceLost { .. }));
     let (outcome, detail) = match found {
-        Err(error @ Error::DeviceLost { .. }) => return Err(error),
+        Err(error) if is_lost => (Outcome::Failed, Some(format!("{error}; no more checks were made"))),
         Err(error) => (Outcome::Failed, Some(advice::sentence(&error))),
         Ok(found) => match numbers::first_difference(&found, &expected) {
             None => (Outcome::Equal, None),
             difference => (Outcome::Different, difference),
         },
     };
-    Ok(Checked { name: trial.name.clone(), outcome, detail, numbers, device_ms, cpu_ms })
+    Ok((Checked { name: trial.name.clone(), outcome, detail, numbers, device_ms, cpu_ms }, is_lost))
 }
 
 /// The report for people.

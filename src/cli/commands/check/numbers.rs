@@ -92,7 +92,7 @@ impl Part {
     fn difference(&self, expected: &Self) -> Option<String> {
         if self.numbers.len() != expected.numbers.len() {
             let (found, expected) = (self.numbers.len(), expected.numbers.len());
-            return Some(format!("{found} numbers of each {}, and {expected} on the CPU", self.of));
+            return Some(format!("{found} numbers of all {}s together, and {expected} on the CPU", self.of));
         }
         let place = self.numbers.iter().zip(&expected.numbers).position(|(found, expected)| found != expected)?;
         let differing =

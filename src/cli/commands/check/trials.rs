@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use super::numbers::Part;
 use crate::cli::built_in;
+use crate::cpu::cells::CpuSearch;
 use crate::engine::Engine;
 use crate::error::{Error, Result};
 use crate::evolve::cells::{self, Budget};
 use crate::evolve::evolution::random_population;
 use crate::evolve::style::Style;
-use crate::evolve::{Ended, Evolution, PaperScheme, Undisturbed};
-use crate::model::cells::Search;
+use crate::evolve::{ColorMode, Ended, Evolution, PaperScheme, Undisturbed};
+use crate::model::cells::{Course, Search};
 use crate::model::{Backdrop, Canvas, Change, Fly, Population, Scene, Target};
 use crate::shapes::{BuiltIn, Shader};
 use crate::studio::{self, Device, Mask, OpenedSearch, Picture, Recipe, Work, make_all};
@@ -19,11 +20,13 @@ use crate::studio::{self, Device, Mask, OpenedSearch, Picture, Recipe, Work, mak
 const SIDE_PX: u32 = 256;
 /// Size in px, of which neither side is a multiple of a block's.
 const SIZE_PX: [u32; 2] = [203, 131];
-const TILES: u64 = 300;
+const TILES: u64 = 200;
 /// Evals of a search.
-const EVALS: u64 = 12_000;
+const EVALS: u64 = 6_000;
 /// Candidates a step.
 const CANDIDATES: [u64; 3] = [1, 8, 64];
+/// How far a tile may move, in 1/64 px.
+const LEASH: u32 = 200;
 /// Births of the published algorithm.
 const BIRTHS: u64 = 600;
 /// Pictures that share the device.
@@ -96,7 +99,7 @@ fn fitness(target: &Arc<Target>) -> Result<Vec<Trial>> {
             parts.push(Part::layers(&evaluator.read_back_layers(0)?));
             let others = dressed_flies(layer_count, 2);
             let change = |index: u32| Change { lane: 0, index, fly: others[index as usize] };
-            for first in [3_u32, 90, 200] {
+            for first in [3_u32, 90, 170] {
                 let changes: Vec<Change> = (first..first + 17).map(change).collect();
                 evaluator.replace(&changes)?;
                 parts.extend(Part::evaluation(&evaluator.evaluation(0)));
@@ -139,8 +142,15 @@ fn searches(target: &Arc<Target>) -> Result<Vec<Trial>> {
             trials.push(search(format!("search, {style}, {candidates} a step"), work));
         }
     }
-    let masked = recipe("mosaic")?.masks(all_shapes()?);
-    trials.push(search("search, mosaic, all shapes", studio::work(target, &masked)?));
+    for style in ["mosaic", "spray"] {
+        let masked = recipe(style)?.masks(all_shapes()?);
+        trials.push(search(format!("search, {style}, all shapes"), studio::work(target, &masked)?));
+        for (name, mode) in [("mean", ColorMode::Mean), ("picked", ColorMode::Pick), ("evolved", ColorMode::Evolved)] {
+            let colored = recipe(style)?.color_mode(mode);
+            trials.push(search(format!("search, {style}, {name} colours"), studio::work(target, &colored)?));
+        }
+        trials.push(leashed(target, style)?);
+    }
     let pixel_count = target.pixels().len();
     let weights = (0..pixel_count).map(|pixel| (pixel % 16 + 1) as u8).collect();
     let weighed = Arc::new(Target::clone(target).with_weights(weights)?);
@@ -158,13 +168,27 @@ fn searches(target: &Arc<Target>) -> Result<Vec<Trial>> {
 }
 
 fn search(name: impl Into<String>, Work { course, .. }: Work) -> Trial {
+    search_from(name, course, None)
+}
+
+/// A search that goes on from tiles of another seed, each of which stays near its place, as in a video.
+fn leashed(target: &Arc<Target>, style: &str) -> Result<Trial> {
+    let mut before = CpuSearch::new(studio::work(target, &recipe(style)?.seed(6))?.course);
+    before.advance(1)?;
+    before.renormalise()?;
+    let mut course = studio::work(target, &recipe(style)?)?.course;
+    course.rules.leash = LEASH;
+    Ok(search_from(format!("search, {style}, on a leash"), course, Some(before.read_back()?.flies)))
+}
+
+fn search_from(name: impl Into<String>, course: Course, first: Option<Vec<Fly>>) -> Trial {
     Trial::new(name, move |device| {
         let OpenedSearch { mut search, stand_in } = device.open_search(course.clone())?;
         if let Some(reason) = stand_in {
             return Err(Error::Internal(format!("the CPU stood in, since {reason}")));
         }
         let budget = Budget { evals: EVALS, target_sae: None, patience: None };
-        cells::run(&mut *search, None, &budget, &mut Undisturbed)?;
+        cells::run(&mut *search, first.as_deref(), &budget, &mut Undisturbed)?;
         everything(&mut *search)
     })
 }

@@ -274,7 +274,7 @@ fn say_notes(job: &Job, options: &PictureOptions, device: &Device) {
     let asked_px = options.settings.long_side_px;
     if asked_px > longer_px && u64::from(asked_px) != LONG_SIDE_PX {
         terminal::say(&format!(
-            "smalti: --size {asked_px} changes nothing, since {} has {longer_px} px; --output-size {asked_px} draws the \
+            "smalti: --size {asked_px} changes nothing, since the longer side of {} has {longer_px} px; --output-size {asked_px} draws the \
              mosaic larger",
             options.input.display()
         ));
@@ -282,7 +282,8 @@ fn say_notes(job: &Job, options: &PictureOptions, device: &Device) {
     let flat = options.outputs.iter().find(|output| output.is_flat());
     if let Some(flat) = flat.filter(|_| job.is_bare || job.target.transparent().is_some()) {
         terminal::say(&format!(
-            "smalti: {} cannot be transparent, so what is will be black; write a .png or .webp, or choose a --background",
+            "smalti: {} cannot be transparent: what is transparent in the picture becomes black in it; write a .png or \
+             .webp, or choose a --background",
             flat.path.display()
         ));
     }

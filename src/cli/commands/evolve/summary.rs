@@ -22,9 +22,10 @@ pub(super) fn print_summary(row: &Row, options: &PictureOptions, job: &Job) {
     let partial = if row.status == Status::Partial { " (partial)" } else { "" };
     terminal::say(&format!("wrote {written}{partial}: {tiles}, {likeness}, {seconds:.1} s{ended}{}", warming_up(row)));
     if stop == StopReason::Time.word() && row.evals == 0 {
-        terminal::say(
-            "no round was over in that time, so nothing is laid yet; give it a longer --time, or fewer tiles with -n",
-        );
+        let so = if options.settings.init_file().is_some() { "nothing has changed" } else { "no tile is laid" };
+        terminal::say(&format!(
+            "no round was over in that time, so {so} yet; give it a longer --time, or fewer tiles with -n"
+        ));
     }
     if row.status == Status::Partial {
         terminal::say("the same command starts over, and --init goes on from a .npz");

@@ -59,7 +59,7 @@ fn score_one(args: &ScoreArgs, reference: &[PathBuf], folder: &Path) -> Result<F
     let mut before: Option<[Photo; 2]> = None;
     let (mut sae, mut pixel_count, mut size_px) = (0, 0, (0, 0));
     for (its, own) in reference.iter().zip(&paths) {
-        let pair = [read(its, None, args.background)?, read(own, None, args.background)?];
+        let pair = [read(its, args)?, read(own, args)?];
         let size = |photo: &Photo| (photo.width_px, photo.height_px);
         let first = before.as_ref().map_or(size(&pair[0]), |before| size(&before[0]));
         if let Some((path, photo)) = [its, own].into_iter().zip(&pair).find(|(_, photo)| size(photo) != first) {

@@ -12,8 +12,8 @@ use crate::cli::terminal::{self, advice};
 use crate::cli::values;
 use crate::error::{Error, Result};
 use crate::metrics::{Picture, Reference, Score};
-use crate::model::Rgb;
-use crate::photo::{self, Background, Photo, ReadOptions};
+use crate::model::{Canvas, Rgb};
+use crate::photo::{self, Background, CutShort, Photo, ReadOptions};
 use crate::studio::color;
 use crate::threads;
 
@@ -62,6 +62,9 @@ pub(crate) struct ScoreArgs {
     /// Reduce REF to the size of each picture first, as evolve reduces its input
     #[arg(long, conflicts_with = "flicker")]
     pub fit: bool,
+    /// If the file of a picture is cut short, use the part that is there
+    #[arg(long)]
+    pub lenient: bool,
     /// Print a JSON array to stdout instead of a table, with one object for each scored picture
     #[arg(long)]
     pub json: bool,
@@ -147,9 +150,9 @@ fn score_all(args: &ScoreArgs) -> Result<ExitCode> {
     if args.fit {
         return score_each(args, |path| score_fitted(args, path), table);
     }
-    let photo = read(&args.reference, None, args.background)?;
+    let photo = read(&args.reference, args)?;
     let reference = reference(args, &photo)?;
-    score_each(args, |path| score_one(&reference, path, args.background), table)
+    score_each(args, |path| score_one(&reference, path, args), table)
 }
 
 /// Scores everything that `args` names against the reference, and prints the rows as JSON or as a table. A failure is
@@ -182,8 +185,8 @@ fn reference<'p>(args: &ScoreArgs, photo: &'p Photo) -> Result<Reference<'p>> {
     Reference::new(picture(photo)).map_err(|reason| Error::input(&args.reference, reason))
 }
 
-fn score_one(reference: &Reference<'_>, path: &Path, background: Rgb) -> Result<ScoreRow> {
-    let photo = read(path, None, background)?;
+fn score_one(reference: &Reference<'_>, path: &Path, args: &ScoreArgs) -> Result<ScoreRow> {
+    let photo = read(path, args)?;
     let score = reference.score(picture(&photo)).map_err(|reason| {
         let advice = if reason.contains("the reference") { "; --fit reduces the reference to its size" } else { "" };
         Error::input(path, reason + advice)
@@ -193,8 +196,8 @@ fn score_one(reference: &Reference<'_>, path: &Path, background: Rgb) -> Result<
 
 /// Scores a picture against the reference at the picture's size.
 fn score_fitted(args: &ScoreArgs, path: &Path) -> Result<ScoreRow> {
-    let photo = read(path, None, args.background)?;
-    let whole = read(&args.reference, None, args.background)?;
+    let photo = read(path, args)?;
+    let whole = read(&args.reference, args)?;
     let mut fitted = photo::fitted(&whole, photo.width_px.max(photo.height_px));
     let (fitted_px, photo_px) = ((fitted.width_px, fitted.height_px), (photo.width_px, photo.height_px));
     if fitted_px.0 < photo_px.0 && fitted_px.1 < photo_px.1 {
@@ -204,24 +207,29 @@ fn score_fitted(args: &ScoreArgs, path: &Path) -> Result<ScoreRow> {
         );
         return Err(Error::input(path, reason));
     }
-    if fitted_px != photo_px && is_rounded_otherwise(fitted_px, photo_px) {
+    if fitted_px != photo_px && is_drawn_larger((whole.width_px, whole.height_px), photo_px) {
         fitted = photo::fitted_to(&whole, photo_px);
     }
     let score = reference(args, &fitted)?.score(picture(&photo)).map_err(|reason| Error::input(path, reason))?;
     Ok(ScoreRow::new(path, &photo, &score))
 }
 
-/// Whether two sizes are those of one picture, of which one was reduced to few pixels on the way and drawn larger: its
-/// sides were rounded twice, and may differ by a hundredth.
-fn is_rounded_otherwise(one: (u32, u32), other: (u32, u32)) -> bool {
-    let is_near = |a: u32, b: u32| a.abs_diff(b) <= 1 + a.max(b) / 100;
-    is_near(one.0, other.0) && is_near(one.1, other.1)
+/// Whether a picture of `drawn_px` may be a mosaic of one of `photo_px`, which was reduced on the way and drawn larger, so
+/// that its sides were rounded twice.
+fn is_drawn_larger(photo_px: (u32, u32), drawn_px: (u32, u32)) -> bool {
+    let long_side_px = drawn_px.0.max(drawn_px.1);
+    (1..long_side_px).any(|evolved_px| {
+        let (width_px, height_px) = photo::fitted_size(photo_px, Some(evolved_px));
+        let canvas = Canvas::scaled(width_px, height_px, long_side_px);
+        (canvas.width_px, canvas.height_px) == drawn_px
+    })
 }
 
-/// Reads a picture, reduced to a longer side if one is given, and prints a warning about what was ignored in it.
-pub(crate) fn read(path: &Path, long_side_px: Option<u32>, background: Rgb) -> Result<Photo> {
-    let background = Background::Color(background);
-    let loaded = photo::read(path, &ReadOptions { background, long_side_px, ..ReadOptions::default() })?;
+/// Reads a picture, and prints a warning about what was ignored in it.
+pub(super) fn read(path: &Path, args: &ScoreArgs) -> Result<Photo> {
+    let background = Background::Color(args.background);
+    let cut_short = if args.lenient { CutShort::Take } else { CutShort::Refuse };
+    let loaded = photo::read(path, &ReadOptions { background, long_side_px: None, cut_short })?;
     for warning in &loaded.warnings {
         terminal::error(&format!("{}: {warning}", path.display()));
     }
