@@ -43,7 +43,6 @@ const SHORT: [Short; 9] = [
             "seed",
             "time",
             "colors",
-            "palette",
             "background",
             "force",
         ],

@@ -16,7 +16,7 @@ fn software_vulkan_is_equal_to_the_cpu_in_every_check_and_the_validation_layer_i
     assert_eq!(report["schema"], "smalti-check");
     for name in ["fitness, translucent", "paper", "search, mosaic, 64 a step", "search, spray, over nothing", "lanes"] {
         let check = checks.iter().find(|check| check["name"] == name).unwrap_or_else(|| panic!("{name} is missing"));
-        assert!(check["numbers"].as_u64() > Some(3_000), "{check}");
+        assert!(check["numbers"].as_u64() > Some(2_000), "{check}");
     }
     assert!(ran.stderr.is_empty(), "{}", ran.stderr);
 }

@@ -79,7 +79,7 @@ fn a_picture_that_is_cut_short_is_refused_unless_what_is_there_is_asked_for() {
     let first_row = taken.photo.width_px as usize;
     assert_eq!(taken.photo.pixels[..first_row], whole.pixels[..first_row]);
     let file = tempfile::NamedTempFile::new().expect("a temporary file");
-    for name in ["progressive.jpg", "rgb.png", "two_frames.gif", "rgb.jxl"] {
+    for name in ["progressive.jpg", "rgb.png", "two_frames.gif", "strip.jxl"] {
         let bytes = fs::read(photo_path(name)).expect("it is there");
         fs::write(file.path(), &bytes[..bytes.len() * 4 / 10]).expect("it can be written");
         assert!(read(file.path(), &ReadOptions::default()).is_err(), "{name}");

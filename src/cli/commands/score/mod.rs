@@ -17,6 +17,8 @@ use crate::photo::{self, Background, CutShort, Photo, ReadOptions};
 use crate::studio::color;
 use crate::threads;
 
+/// The smallest size at which a mosaic is likely to have evolved: to fewer pixels, pictures of all shapes are squares.
+const EVOLVED_MIN_PX: u32 = 7;
 /// Exit code when some of the pictures could not be scored.
 const EXIT_SOME_FAILED: u8 = 3;
 
@@ -214,11 +216,11 @@ fn score_fitted(args: &ScoreArgs, path: &Path) -> Result<ScoreRow> {
     Ok(ScoreRow::new(path, &photo, &score))
 }
 
-/// Whether a picture of `drawn_px` may be a mosaic of one of `photo_px`, which was reduced on the way and drawn larger, so
-/// that its sides were rounded twice.
+/// Whether a picture of `drawn_px` may be a mosaic of one of `photo_px`, which was reduced on the way and drawn larger,
+/// so that its sides were rounded twice.
 fn is_drawn_larger(photo_px: (u32, u32), drawn_px: (u32, u32)) -> bool {
     let long_side_px = drawn_px.0.max(drawn_px.1);
-    (1..long_side_px).any(|evolved_px| {
+    (EVOLVED_MIN_PX..long_side_px).any(|evolved_px| {
         let (width_px, height_px) = photo::fitted_size(photo_px, Some(evolved_px));
         let canvas = Canvas::scaled(width_px, height_px, long_side_px);
         (canvas.width_px, canvas.height_px) == drawn_px
