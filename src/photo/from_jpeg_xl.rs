@@ -2,6 +2,8 @@
 //! processors. Lossy files still go through the powers and roots of the system's library, so another system may come to
 //! a channel that is off by one.
 
+use std::borrow::Cow;
+
 use bytemuck::cast_slice_mut;
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageBuffer};
@@ -35,7 +37,7 @@ pub(super) fn decode(bytes: &[u8], cut_short: CutShort) -> Result<Raw, String> {
     let samples = size_px.0 as usize * size_px.1 as usize * (3 + info.extra_channels.len());
     let (is_moving, extra_count) = (info.animation.is_some(), info.extra_channels.len());
     let (mut decoder, rest) = opened(bytes, Some(samples.saturating_add(SPARE_SAMPLES)))?;
-    decoder.set_pixel_format(layout.format(extra_count)).map_err(broken)?;
+    decoder.set_pixel_format(layout.format(extra_count)).map_err(|error| broken(&error))?;
     let mut warnings = Vec::new();
     if is_moving {
         warnings.push("the first frame of an animation is read".to_owned());
@@ -87,13 +89,13 @@ fn opened(bytes: &[u8], sample_limit: Option<usize>) -> Result<(JxlDecoder, &[u8
     options.sample_limit = sample_limit;
     let mut decoder = JxlDecoder::new(options);
     let mut rest = bytes;
-    match decoder.process(&mut rest, None, None).map_err(broken)? {
+    match decoder.process(&mut rest, None, None).map_err(|error| broken(&error))? {
         Event::BasicInfo => Ok((decoder, rest)),
         _ => Err(broken_sentence(JpegXl, "its header is cut short")),
     }
 }
 
-fn broken(error: jxl::error::Error) -> String {
+fn broken(error: &jxl::error::Error) -> String {
     broken_sentence(JpegXl, &error.to_string())
 }
 
@@ -109,11 +111,11 @@ fn read(
     let row_bytes = width_px as usize * layout.channels() * layout.sample_bytes();
     let mut buffers = [JxlOutputBuffer::new(samples, height_px as usize, row_bytes)];
     loop {
-        match decoder.process(&mut rest, Some(&mut buffers), None).map_err(broken)? {
+        match decoder.process(&mut rest, Some(&mut buffers), None).map_err(|error| broken(&error))? {
             Event::FrameComplete { .. } | Event::Complete => return Ok(()),
             Event::BasicInfo | Event::FrameHeader => {}
             Event::NeedMoreInput { .. } if cut_short == CutShort::Take => {
-                decoder.flush_pixels(&mut buffers, None).map_err(broken)?;
+                decoder.flush_pixels(&mut buffers, None).map_err(|error| broken(&error))?;
                 break;
             }
             Event::NeedMoreInput { .. } => return Err(broken_sentence(JpegXl, "its end is missing")),
@@ -135,7 +137,7 @@ fn space(profile: &JxlColorProfile, warnings: &mut Vec<String>) -> Space {
     if icc.is_none() {
         warnings.push("its colours are of a space that is not known here, and are taken for sRGB".to_owned());
     }
-    space_of(icc.map(|icc| icc.into_owned()), warnings)
+    space_of(icc.map(Cow::into_owned), warnings)
 }
 
 fn is_srgb(profile: &JxlColorProfile) -> bool {

@@ -45,7 +45,7 @@ pub use instance::{Instance, InstanceOptions, Validation};
 pub use messages::ValidationLog;
 pub use observe::{ClockMethod, Submission, SubmissionObserver};
 pub use pass::{ClearColor, ColorTarget, ComputePass, RenderPass, RenderTargets, TransferPass};
-pub use physical::{DeviceInfo, DeviceKind, DeviceLimits, NEEDED_LIMITS};
+pub use physical::{DeviceInfo, DeviceKind, DeviceLimits, NEEDED_LIMITS, NeededLimit};
 pub use pipeline::{ComputePipeline, ComputeShader, DepthTest, GraphicsPipeline, GraphicsShaders};
 pub use pipeline_layout::{BindingKind, PipelineLayout};
 pub use recorder::Recorder;

@@ -113,11 +113,24 @@ const SUBGROUP_NAMES: [(vk::SubgroupFeatureFlags, &str); 8] = [
     (vk::SubgroupFeatureFlags::QUAD, "quad"),
 ];
 
-/// Limits of which some pipeline needs more than every Vulkan device has: what they are called, how much is needed, and
-/// what a device offers. A test compares the needs with the modules of the shaders.
-pub const NEEDED_LIMITS: [(&str, u32, fn(&DeviceLimits) -> u32); 2] = [
-    ("storage buffers per shader stage", 14, |limits| limits.storage_buffers_per_stage),
-    ("invocations in a workgroup", 256, |limits| limits.workgroup_invocations),
+/// A limit of which some pipeline needs more than every Vulkan device has.
+#[derive(Clone, Copy, Debug)]
+pub struct NeededLimit {
+    /// What it is called.
+    pub name: &'static str,
+    /// How much is needed.
+    pub needed: u32,
+    offered: fn(&DeviceLimits) -> u32,
+}
+
+/// All such limits. A test compares the needs with the modules of the shaders.
+pub const NEEDED_LIMITS: [NeededLimit; 2] = [
+    NeededLimit {
+        name: "storage buffers per shader stage",
+        needed: 14,
+        offered: |limits| limits.storage_buffers_per_stage,
+    },
+    NeededLimit { name: "invocations in a workgroup", needed: 256, offered: |limits| limits.workgroup_invocations },
 ];
 
 /// Asks the driver everything that [`DeviceInfo`] holds.
@@ -187,7 +200,7 @@ fn add_details(instance: &ash::Instance, handle: vk::PhysicalDevice, info: &mut 
 
 /// The limits that are too low, in words.
 fn missing_limits(limits: &DeviceLimits) -> impl Iterator<Item = String> {
-    let too_low = |(name, needed, offered): (&str, u32, fn(&DeviceLimits) -> u32)| {
+    let too_low = |NeededLimit { name, needed, offered }: NeededLimit| {
         let offered = offered(limits);
         (offered < needed).then(|| format!("{needed} {name} (it has {offered})"))
     };

@@ -72,7 +72,7 @@ fn a_device_must_have_what_the_modules_use_and_no_more() {
         sizes.max().unwrap_or(1) as usize
     };
     let most = |of: &dyn Fn(&Vec<Vec<u32>>) -> usize| modules.values().map(of).max().unwrap();
-    let needed = NEEDED_LIMITS.map(|(name, needed, _)| (name, needed as usize));
+    let needed = NEEDED_LIMITS.map(|limit| (limit.name, limit.needed as usize));
     assert_eq!(needed[1], ("invocations in a workgroup", most(&invocations)));
     assert_eq!(needed[0], ("storage buffers per shader stage", most(&storage_buffers)));
 }

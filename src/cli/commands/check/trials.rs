@@ -14,7 +14,7 @@ use crate::evolve::{ColorMode, Ended, Evolution, PaperScheme, Undisturbed};
 use crate::model::cells::{Course, Search};
 use crate::model::{Backdrop, Canvas, Change, Fly, Population, Scene, Target};
 use crate::shapes::{BuiltIn, Shader};
-use crate::studio::{self, Device, Mask, OpenedSearch, Picture, Recipe, Work, make_all};
+use crate::studio::{self, Device, Mask, OpenedSearch, Picture, Recipe, make_all};
 
 /// The picture is cut from one with sides of so many px.
 const SIDE_PX: u32 = 256;
@@ -32,10 +32,12 @@ const BIRTHS: u64 = 600;
 /// Pictures that share the device.
 const LANES: usize = 6;
 
+type Work = Box<dyn Fn(&Device) -> Result<Vec<Part>>>;
+
 /// One check.
 pub(super) struct Trial {
     pub name: String,
-    work: Box<dyn Fn(&Device) -> Result<Vec<Part>>>,
+    work: Work,
 }
 
 impl Trial {
@@ -167,7 +169,7 @@ fn searches(target: &Arc<Target>) -> Result<Vec<Trial>> {
     Ok(trials)
 }
 
-fn search(name: impl Into<String>, Work { course, .. }: Work) -> Trial {
+fn search(name: impl Into<String>, studio::Work { course, .. }: studio::Work) -> Trial {
     search_from(name, course, None)
 }
 
