@@ -173,7 +173,8 @@ fn rounded(value: f32) -> u8 {
 
 /// The fitted size in px: the longer side is `long_side_px`, the other one is rounded half up, and neither is below 1
 /// px.
-pub(crate) fn fitted_size((width_px, height_px): (u32, u32), long_side_px: Option<u32>) -> (u32, u32) {
+#[must_use]
+pub fn fitted_size((width_px, height_px): (u32, u32), long_side_px: Option<u32>) -> (u32, u32) {
     let longer_px = u64::from(width_px.max(height_px));
     let fitted_px = u64::from(long_side_px.unwrap_or(u32::MAX).max(1)).min(longer_px);
     let scaled = |side_px: u32| ((u64::from(side_px) * fitted_px * 2 + longer_px) / (longer_px * 2)).max(1) as u32;
