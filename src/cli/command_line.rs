@@ -186,7 +186,7 @@ enum Command {
     ///
     /// It is drawn, at any size, from the snapshots that `smalti evolve --save-run DIR` kept.
     Timelapse(Box<TimelapseArgs>),
-    /// List the Vulkan devices of this machine
+    /// List the graphics cards of this machine, as Vulkan sees them
     Devices(DevicesArgs),
     /// Measure how close pictures come to a reference
     ///
@@ -205,7 +205,7 @@ enum Command {
     ///
     /// Tells which pictures failed, and which are missing.
     Merge(MergeArgs),
-    /// Check that a Vulkan device gives the same numbers as the CPU
+    /// Check that a graphics card computes what the CPU computes
     ///
     /// Run it once on a new graphics card or driver.
     Check(CheckArgs),

@@ -25,7 +25,7 @@ enum Right {
 }
 
 /// Flags that people try, and what they mean.
-const WRONG_FLAGS: [(&[&str], Right); 41] = [
+const WRONG_FLAGS: [(&[&str], Right); 43] = [
     (
         &["--width", "--height", "--w", "--h", "--resize", "--resolution", "--scale", "--dimensions", "--long-side"],
         Flag(
@@ -82,6 +82,11 @@ const WRONG_FLAGS: [(&[&str], Right); 41] = [
         &["--colours", "--num-colors", "--num-colours", "--palette-size"],
         Flag("colors", "write --colors K for the number of colours"),
     ),
+    (
+        &["--tile-size", "--block-size", "--cell-size", "--pixel-size", "--radius"],
+        Flag("tiles", "write -n N for the number of tiles: the more there are, the smaller they are"),
+    ),
+    (&["--mosaic", "--paint", "--spray"], Flag("style", "write --style mosaic, --style paint or --style spray")),
     (&["--colour-mode"], Flag("color-mode", "write --color-mode MODE")),
     (
         &["--color", "--colour"],
@@ -143,6 +148,18 @@ const WRONG_FLAGS: [(&[&str], Right); 41] = [
     ),
 ];
 
+/// Commands that people try, and what they mean.
+const WRONG_COMMANDS: [(&[&str], &str); 5] = [
+    (
+        &["convert", "make", "create", "run", "generate", "mosaicize"],
+        "for a picture write smalti evolve photo.jpg -o mosaic.png",
+    ),
+    (&["compare", "diff", "measure"], "to compare pictures write smalti score photo.jpg mosaic.png --fit"),
+    (&["info", "identify", "inspect"], "to see how a file was made write smalti show mosaic.png"),
+    (&["resize", "scale", "enlarge"], "add --output-size PX to smalti evolve, or to smalti render for a .npz"),
+    (&["list", "styles", "themes"], "the styles are free, mosaic, paint and spray, as in --style mosaic"),
+];
+
 /// The command line, with `evolve` added where a picture stands in the place of a command.
 pub(super) fn with_command(mut tokens: Vec<OsString>, whole: &Command) -> Vec<OsString> {
     let first = tokens.get(1).filter(|first| !is_command(whole, first)).map(Path::new);
@@ -173,6 +190,15 @@ pub(super) fn of(error: &clap::Error, tokens: &[OsString], whole: &Command) -> O
                 let name = command.get_name();
                 return Some(format!("{argument} stands before the command; write smalti {name} first, then the rest"));
             }
+            if let Some(word) =
+                tokens.iter().filter_map(|token| token.to_str()).find(|word| is_one_minus(word, &argument))
+            {
+                return Some(format!(
+                    "{word} has one minus, so each of its letters is a flag; long flags have two, as in --colors 8; see \
+                     smalti {} --help",
+                    command.get_name()
+                ));
+            }
             let is_flag = argument.starts_with('-');
             if is_flag { no_flag(&argument, command, whole) } else { surplus(&argument, command, tokens) }
         }
@@ -184,6 +210,14 @@ pub(super) fn of(error: &clap::Error, tokens: &[OsString], whole: &Command) -> O
         }
         _ => None,
     }
+}
+
+/// Whether a word is of several letters behind one minus, of which one is the flag that is not known. `-n500` is not.
+fn is_one_minus(word: &str, flag: &str) -> bool {
+    let letters = word.strip_prefix('-').filter(|letters| letters.len() > 1);
+    let letter = flag.strip_prefix('-').filter(|letter| letter.chars().count() == 1);
+    let is_word = |letters: &str| letters.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-');
+    letters.zip(letter).is_some_and(|(letters, letter)| is_word(letters) && letters.contains(letter))
 }
 
 /// What stands in the place of a command is none.
@@ -198,6 +232,8 @@ fn no_command(word: &str) -> Option<String> {
         format!("is no command; for a video write smalti video {typed} -o mosaic.mp4")
     } else if path.is_file() {
         format!("is no command; for a picture write smalti evolve {typed} -o mosaic.png")
+    } else if let Some((_, right)) = WRONG_COMMANDS.iter().find(|(wrong, _)| wrong.contains(&word)) {
+        format!("is no command; {right}")
     } else if let Some(style) = Style::NAMES.into_iter().find(|name| word.eq_ignore_ascii_case(name)) {
         format!("is a style and no command; write smalti evolve photo.jpg -o mosaic.png --style {style}")
     } else {
@@ -237,6 +273,14 @@ fn no_flag(flag: &str, command: &Command, whole: &Command) -> Option<String> {
 fn surplus(argument: &str, command: &Command, tokens: &[OsString]) -> Option<String> {
     let input = first_argument(command, tokens)?;
     let [first, second] = [&input, argument].map(quoted);
+    let is_after_quiet = tokens.windows(2).any(|pair| pair[0] == "-q" && pair[1] == argument);
+    if is_after_quiet && argument.parse::<f64>().is_ok() {
+        return Some(format!("-q is --quiet and takes no {argument}; a .jpg is written at quality 92"));
+    }
+    let spaced = format!("{input} {argument}");
+    if Path::new(&spaced).is_file() {
+        return Some(format!("a name with spaces needs quotation marks: {}", quoted(&spaced)));
+    }
     if command.get_name() == "show" {
         return Some(format!(
             "smalti show tells of one file; whether it was made of {argument} tells smalti show {first} --input {second}"
@@ -260,6 +304,10 @@ fn surplus(argument: &str, command: &Command, tokens: &[OsString]) -> Option<Str
 
 /// A value that means something elsewhere.
 fn no_value(flag: &str, value: &str, command: &Command) -> Option<String> {
+    if value.is_empty() && (flag.starts_with("--grout <") || flag.starts_with("--background")) {
+        let name = flag.split(' ').next()?;
+        return Some(format!("{name} needs a colour; one that begins with # needs quotation marks: {name} '#f80'"));
+    }
     let is_moving = ["gif", "apng"].iter().chain(&VIDEOS).any(|ending| value.eq_ignore_ascii_case(ending));
     let is_color = |word: &str| !word.is_empty() && crate::studio::color(word.trim()).is_ok();
     if flag.starts_with("--colors") && value.split(',').all(is_color) {

@@ -16,9 +16,9 @@ pub(crate) struct CellsArgs {
     /// paint makes brush strokes, spray makes soft clouds of colour.
     #[arg(long, value_name = "NAME", value_parser = preset::parse_style, conflicts_with = "preset")]
     pub style: Option<String>,
-    /// How many children to try before the search ends (500k, 2M) [default: 400 for each tile]
+    /// How many new or changed tiles to try before the search ends (500k, 2M) [default: 400 for each tile]
     ///
-    /// A child is a new or changed tile. It is kept only if the mosaic comes closer to the picture.
+    /// Each is kept only if the mosaic comes closer to the picture.
     #[arg(long, value_name = "E", value_parser = values::count)]
     pub evals: Option<u64>,
     /// Children tried in each step, of which the best is taken, 1 to 64; more is faster on a GPU [default: 1]

@@ -15,7 +15,7 @@ use crate::studio::{LookChoices, Mask};
 pub(crate) struct LookArgs {
     /// Shape of the tiles: square, border, lines, flower, disc, triangle, hexagon, brush, or your own PNG or SVG
     ///
-    /// Several shapes with commas make a mix. Unless this flag is given, the style or the population decides; else it
+    /// Several shapes with commas make a mix. Unless this flag is given, the style or --init decides; else it
     /// is square.
     #[arg(long = "mask", value_name = "NAME|FILE", value_delimiter = ',', value_parser = values::path_in_list())]
     pub masks: Vec<PathBuf>,

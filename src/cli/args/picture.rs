@@ -33,7 +33,8 @@ pub(crate) struct PictureArgs {
     pub tiles: Option<u64>,
     /// Longer side in px at which the picture evolves [default: 512]
     ///
-    /// A larger picture is reduced to this size first; a smaller one is never enlarged. 1 to 65,535 px.
+    /// More px show finer detail and take more time. A larger picture is reduced to this size first; a smaller one is
+    /// never enlarged. For the size of the result there is --output-size. 1 to 65,535 px.
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
     pub size: Option<u64>,
     /// Reduce the picture to this many colours first: 1 to 256, or full for all of them [default: full]
@@ -46,7 +47,7 @@ pub(crate) struct PictureArgs {
     /// Colour behind the tiles and behind transparent pixels, or none for a transparent background
     ///
     /// A colour is a name such as navy, or hexadecimal digits such as #f80 or ff8800. Without this flag, the
-    /// population of --init or the style decides, and otherwise it is black. Transparent parts of the picture then
+    /// tiles of --init or the style decide, and otherwise it is black. Transparent parts of the picture then
     /// stay transparent, except with --scheme paper.
     #[arg(long, value_name = "COLOR", value_parser = backdrop, help_heading = "Picture")]
     pub background: Option<Backdrop>,
@@ -58,7 +59,7 @@ pub(crate) struct PictureArgs {
     /// If the file of the picture is cut short, use the part that is there
     #[arg(long, help_heading = "Picture")]
     pub lenient: bool,
-    /// Begin with the tiles of this population instead of random ones
+    /// Begin with the tiles that this file holds, instead of random ones
     ///
     /// It must come from a picture of the same size. It also sets the number of tiles.
     #[arg(long, value_name = "POP.npz", help_heading = "Picture", conflicts_with = "tiles")]

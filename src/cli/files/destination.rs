@@ -30,6 +30,12 @@ pub(crate) struct Destination {
 impl Destination {
     /// The destination of a result; the ending of `path` tells what is written.
     pub(crate) fn for_result(path: &Path) -> Result<Self> {
+        let text = path.to_string_lossy();
+        let parts: Vec<&str> = text.split(',').collect();
+        if parts.len() > 1 && parts.iter().all(|part| has_known_ending(part.trim())) {
+            let each: Vec<String> = parts.iter().map(|part| format!("-o {}", part.trim())).collect();
+            return Err(Error::Usage(format!("-o {text}: -o names one file; repeat it, as in {}", each.join(" "))));
+        }
         let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
         let content = match extension.as_str() {
             "png" => Content::Png,
@@ -96,6 +102,13 @@ impl Destination {
         // Devices and pipes are not replaced.
         !self.is_stdout() && self.path.is_file()
     }
+}
+
+/// Whether a name ends as that of an output does.
+fn has_known_ending(name: &str) -> bool {
+    let ending = Path::new(name).extension().and_then(OsStr::to_str).unwrap_or_default();
+    let known = ["png", "jpg", "jpeg", "webp", "svg", "ora", "npz", "json", "csv"];
+    known.iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
 /// What has to be drawn for these outputs.

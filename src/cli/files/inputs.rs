@@ -69,6 +69,9 @@ pub(crate) fn find(named: &[PathBuf], depth: Depth, outputs: &Path, left_out: &m
 /// # Errors
 /// [`Error::Input`] if it cannot be read, or holds none.
 pub(crate) fn in_folder(folder: &Path, left_out: &mut LeftOut) -> Result<Vec<PathBuf>> {
+    if folder.is_file() {
+        return Err(Error::input(folder, "is a file; name a folder of frames"));
+    }
     let mut listing = Listing { found: Vec::new(), left_out, depth: Depth::Flat, outputs: Path::new("") };
     listing.list(folder, Path::new("")).map_err(|error| Error::input(folder, photo::why_unreadable(&error)))?;
     if listing.found.is_empty() {

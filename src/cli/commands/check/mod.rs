@@ -20,7 +20,8 @@ use crate::studio::Device;
 use crate::vk::Validation;
 
 const AFTER_HELP: &str = "\
-Each check computes the same on the device and on the CPU and compares all numbers, which must be equal:
+Each line of the table is one part of smalti. It is computed on the device and on the CPU, and all numbers must be equal. If one \
+line says something else, please report it with what --json prints, and use --device cpu until then. The parts:
   fitness   the two nearest tiles of every pixel, the error, and the marginal fitness of every tile
   paper     the published algorithm, birth by birth
   search    the search in cells: tiles, step sizes, fitness and what lies on every pixel, for each style and for 1, 8 and 64
@@ -135,8 +136,8 @@ fn the_device_itself(device: Device, validation: Validation) -> Result<Device> {
     let Some(vulkan) = device.vulkan() else {
         let reason = device.stand_in_reason().map_or_else(String::new, |reason| format!(", since {reason}"));
         let why = format!(
-            "the CPU is what devices are compared with, and there is no other to check{reason}; smalti check --device \
-             vulkan takes software Vulkan, too, and smalti devices lists what there is"
+            "the CPU is what devices are compared with, and there is no other to check{reason}; smalti works without \
+             one, and smalti check --device vulkan takes software Vulkan, too"
         );
         return Err(Error::NoSuitableDevice { why: NoDevice::Other(why) });
     };
