@@ -18,10 +18,11 @@ use super::raw::{CutShort, Need, Raw, Space, broken_sentence, space_of, taken_in
 
 /// Samples that a small picture may have besides those of its size, for frames that are larger than it.
 const SPARE_SAMPLES: usize = 1 << 20;
-/// Bytes per pixel that the decoder keeps: planes of floats, before and after filters, and frames to refer to.
-const OWN_BYTES: u64 = 48;
+/// Bytes per pixel that the decoder keeps: a photo takes next to none, since groups are decoded one by one, and a frame
+/// that others refer to takes a plane of floats for each channel.
+const OWN_BYTES: u64 = 16;
 /// The same for each channel beside the colours.
-const EXTRA_BYTES: u64 = 16;
+const EXTRA_BYTES: u64 = 8;
 /// Most bits of a sample that fits a byte.
 const BYTE_BITS: u32 = 8;
 
