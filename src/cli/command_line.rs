@@ -193,7 +193,7 @@ enum Command {
     /// All figures are of 8-bit sRGB, after EXIF orientation and ICC profile have been applied, and can be recomputed
     /// with numpy, scipy and scikit-image. Of an animation the first frame is measured.
     Score(ScoreArgs),
-    /// Tell how a file was made, as the command that makes it again
+    /// Show how a file was made, and the command that makes it again
     ///
     /// Reads what smalti wrote into its pictures, animations and populations.
     Show(ShowArgs),

@@ -38,10 +38,14 @@ pub(crate) struct PictureArgs {
     #[arg(long, value_name = "PX", value_parser = values::count, help_heading = "Picture")]
     pub size: Option<u64>,
     /// Reduce the picture to this many colours first: 1 to 256, or full for all of them [default: full]
+    ///
+    /// A tile over several of them may take one in between. With --palette every tile has one of the colours.
     #[arg(long, value_name = "K", value_parser = color_count, help_heading = "Picture", conflicts_with = "palette")]
     pub colors: Option<Colors>,
     /// Use only the colours in this file, for the picture and for the tiles: .gpl, .pal, .hex (one colour a line), or
     /// a picture of at most 256 colours
+    ///
+    /// The grout does not keep to them, unless --grout names one.
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     pub palette: Option<PathBuf>,
     /// Colour behind the tiles and behind transparent pixels, or none for a transparent background
@@ -80,7 +84,7 @@ pub(crate) struct PictureArgs {
     /// Where the colour of a new tile comes from [default: median, or evolved with --scheme paper]
     #[arg(long, value_enum, value_name = "MODE", help_heading = "Search")]
     pub color_mode: Option<ColorModeName>,
-    /// Stop when the sum of absolute errors is this small (40k, 2M) [default: never]
+    /// Stop when the sum of absolute errors (SAE, as smalti show tells it) is this small (40k, 2M) [default: never]
     #[arg(long, value_name = "S", value_parser = values::count, help_heading = "Search")]
     pub target_sae: Option<u64>,
     /// Stop after trying this many children without progress (40k, 2M) [default: never]

@@ -47,8 +47,7 @@ pub(crate) struct EvolveArgs {
     /// Also keep about 250 snapshots of the evolution in this folder, for smalti timelapse
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     pub save_run: Option<PathBuf>,
-    /// Take a snapshot at least every B evals or births (40k, 2M); early ones are closer together [default: a 100th of
-    /// all]
+    /// Take a snapshot after every B tried tiles (40k, 2M), and more often at the beginning [default: a 100th of all]
     #[arg(long, value_name = "B", value_parser = values::count, requires = "save_run", help_heading = "Output")]
     pub save_every: Option<u64>,
     /// Replace files that smalti did not write, or wrote with other options

@@ -24,14 +24,14 @@ const EXIT_SOME_FAILED: u8 = 3;
 
 const AFTER_HELP: &str = "\
 Columns (more in --json: MAE_R, MAE_G, MAE_B, EDGE_P, EDGE_R, width, height):
-  SAE   sum of absolute errors over all pixels and channels, 0 to 255 each
-  MAE   their mean; RMSE the root of the mean square; PSNR = 20 log10(255 / RMSE) dB
+  SAE   sum of absolute errors over all pixels and channels, 0 to 255 each; lower is closer
+  MAE   their mean; RMSE the root of the mean square; PSNR = 20 log10(255 / RMSE) dB, higher is closer
   SSIM  structural similarity, 7x7 px window, mean of the channels; 1 is identical
   GMSM  mean similarity of luma gradients, 1 is identical; GMSD its standard deviation
   EDGE  how well edges are kept: F1 of the Canny edges of luma, found again within 2 px; EDGE_P is precision, EDGE_R is recall
 
 With --flicker, REF and OUT are folders of frames in natural order, and the columns are of all neighbouring frames:
-  FLICKER  mean of |OUT[t] - OUT[t-1]| over the channels of pixels of which no channel of REF changes by more than --still
+  FLICKER  how much OUT changes where REF stands still, lower is better: mean of |OUT[t] - OUT[t-1]| over the channels of pixels of which no channel of REF changes by more than --still
   STILL    the share of such pixels
   CHANGE   mean of |(OUT[t] - OUT[t-1]) - (REF[t] - REF[t-1])| over the channels of all pixels
   SAE, MAE of OUT to REF, over all frames
