@@ -32,36 +32,23 @@ impl Destination {
     pub(crate) fn for_result(path: &Path) -> Result<Self> {
         let text = path.to_string_lossy();
         let parts: Vec<&str> = text.split(',').collect();
-        if parts.len() > 1 && parts.iter().all(|part| has_known_ending(part.trim())) {
+        if parts.len() > 1 && parts.iter().all(|part| content_of(Path::new(part.trim())).is_some()) {
             let each: Vec<String> = parts.iter().map(|part| format!("-o {}", part.trim())).collect();
             return Err(Error::Usage(format!("-o {text}: -o names one file; repeat it, as in {}", each.join(" "))));
         }
-        let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
-        let content = match extension.as_str() {
-            "png" => Content::Png,
-            "jpg" | "jpeg" => Content::JPEG,
-            "webp" => Content::WebP,
-            "svg" => Content::Svg,
-            "ora" => Content::OpenRaster,
-            "npz" => Content::Population,
-            "json" => Content::Json,
-            "csv" => Content::Csv,
-            _ if path == Path::new("-") => Content::Png,
-            "gif" | "apng" | "mp4" | "webm" => {
-                let path = path.display();
-                return Err(Error::Usage(format!(
-                    "{path}: a mosaic is a still picture, such as .png; to watch it evolve, add --save-run run, and then run \
-                     smalti timelapse run -o {path}"
-                )));
-            }
-            _ => {
-                return Err(Error::Usage(format!(
-                    "{}: an output must end in .png, .jpg, .jpeg, .webp, .svg, .ora, .npz, .json or .csv, or be -",
-                    path.display()
-                )));
-            }
-        };
-        Ok(Self { path: path.to_owned(), content })
+        if let Some(content) = content_of(path) {
+            return Ok(Self { path: path.to_owned(), content });
+        }
+        let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
+        let path = path.display();
+        Err(Error::Usage(if ["gif", "apng", "mp4", "webm"].contains(&ending.as_str()) {
+            format!(
+                "{path}: a mosaic is a still picture, such as .png; to watch it evolve, add --save-run run, and then run \
+                 smalti timelapse run -o {path}"
+            )
+        } else {
+            format!("{path}: an output must end in .png, .jpg, .jpeg, .webp, .svg, .ora, .npz, .json or .csv, or be -")
+        }))
     }
 
     /// The destination of the fitted picture.
@@ -104,11 +91,21 @@ impl Destination {
     }
 }
 
-/// Whether a name ends as that of an output does.
-fn has_known_ending(name: &str) -> bool {
-    let ending = Path::new(name).extension().and_then(OsStr::to_str).unwrap_or_default();
-    let known = ["png", "jpg", "jpeg", "webp", "svg", "ora", "npz", "json", "csv"];
-    known.iter().any(|known| ending.eq_ignore_ascii_case(known))
+/// What is written to a path, as its ending tells.
+fn content_of(path: &Path) -> Option<Content> {
+    let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
+    Some(match ending.as_str() {
+        "png" => Content::Png,
+        "jpg" | "jpeg" => Content::JPEG,
+        "webp" => Content::WebP,
+        "svg" => Content::Svg,
+        "ora" => Content::OpenRaster,
+        "npz" => Content::Population,
+        "json" => Content::Json,
+        "csv" => Content::Csv,
+        _ if path == Path::new("-") => Content::Png,
+        _ => return None,
+    })
 }
 
 /// What has to be drawn for these outputs.
