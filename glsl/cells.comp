@@ -6,8 +6,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
-#extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "shared/subgroups.glsl"
 
 #include "shared/cells_stage.glsl"
 #include "shared/tile.glsl"
@@ -44,6 +43,8 @@ struct Seen {
     // Weight of the pixels in the scratch, and how many of them are this invocation's.
     uint weight;
     uint own_count;
+    // The most that an invocation has there.
+    uint most;
     // Whether some pixel that it covers has a full stack.
     bool is_crowded;
     // Whether it would show anywhere.
@@ -118,15 +119,79 @@ Seen look(Fly child, uint index, Footprint footprint, bool has_color) {
             }
         }
     }
-    ivec4 all = sum_all(ivec4(change, weight, crowded, shows));
+    uint most = count;
+    ivec4 all = sum_all(ivec4(change, weight, crowded, shows), most);
     if (COLOR_SOURCE == COLOR_MEAN) {
         sums = uvec3(sum_all(ivec4(sums, 0)).xyz);
     }
-    return Seen(all.x, uint(all.y), count, all.z != 0, all.w != 0, sums);
+    return Seen(all.x, uint(all.y), count, most, all.z != 0, all.w != 0, sums);
+}
+
+// Weights by half a byte of each channel; of the upper half, then of the lower half where the upper one is the
+// median's.
+const uint HALVES = 16u;
+shared uint shared_weights[2u * 3u * HALVES];
+
+void clear_weights(uint table) {
+    for (uint place = gl_LocalInvocationID.x; place < 3u * HALVES; place += LANES) {
+        shared_weights[table * 3u * HALVES + place] = 0u;
+    }
+}
+
+// The largest halves of which no more than `rank` lies below, and adds what does.
+uvec3 median_halves(uint table, uint rank, inout uvec3 below) {
+    uint first = table * 3u * HALVES;
+    uvec3 found = uvec3(0u);
+    uvec3 sum = below;
+    [[unroll]] for (uint half_byte = 0u; half_byte < HALVES; ++half_byte) {
+        bvec3 is_below = lessThanEqual(sum, uvec3(rank));
+        found = mix(found, uvec3(half_byte), is_below);
+        below = mix(below, sum, is_below);
+        sum += uvec3(
+            shared_weights[first + half_byte], shared_weights[first + HALVES + half_byte],
+            shared_weights[first + 2u * HALVES + half_byte]
+        );
+    }
+    return found;
+}
+
+// As `median_color`, half a byte at a time: for several subgroups, which pay for each pass with a barrier.
+uint median_by_halves(uint weight, uint own_count) {
+    uint rank = (weight - 1u) / 2u;
+    // The table of the upper halves was cleared before the last barrier.
+    for (uint place = 0u; place < own_count; ++place) {
+        uint word = scratch[scratch_place(place, 0u)];
+        uvec3 half_bytes = channels_of(word) >> 4;
+        [[unroll]] for (uint channel = 0u; channel < 3u; ++channel) {
+            atomicAdd(shared_weights[channel * HALVES + half_bytes[channel]], uint(scratch_weight(word)));
+        }
+    }
+    clear_weights(1u);
+    barrier();
+    uvec3 below = uvec3(0u);
+    uvec3 upper = median_halves(0u, rank, below);
+    for (uint place = 0u; place < own_count; ++place) {
+        uint word = scratch[scratch_place(place, 0u)];
+        uvec3 channels = channels_of(word);
+        [[unroll]] for (uint channel = 0u; channel < 3u; ++channel) {
+            if (channels[channel] >> 4 == upper[channel]) {
+                uint half_byte = channels[channel] & 15u;
+                atomicAdd(shared_weights[(3u + channel) * HALVES + half_byte], uint(scratch_weight(word)));
+            }
+        }
+    }
+    barrier();
+    uvec3 median = upper << 4 | median_halves(1u, rank, below);
+    // Read for the last time before that barrier.
+    clear_weights(0u);
+    return median.x | median.y << 8 | median.z << 16;
 }
 
 // The weighted medians of the channels in the scratch, bit by bit. Twin: src/model/cells/color.rs.
 uint median_color(uint weight, uint own_count) {
+    if (WIDE == 1u) {
+        return median_by_halves(weight, own_count);
+    }
     int rank = int(weight - 1u) / 2;
     uvec3 median = uvec3(0u);
     for (uint bit = 128u; bit > 0u; bit >>= 1) {
@@ -184,8 +249,7 @@ bool evaluate(Candidate candidate, inout Best best) {
     Seen seen = look(candidate.fly, candidate.index, footprint, has_color);
     int change = seen.change;
     if (!has_color) {
-        uint most = max_all(seen.own_count);
-        if (!afford(20u + 9u * most)) {
+        if (!afford(20u + 9u * seen.most)) {
             return false;
         }
         uint color = found_color(candidate.fly, seen);
@@ -337,7 +401,7 @@ uint exchange_pixel(Swap swap, uint place, uint look) {
     return depth;
 }
 
-void exchange(Swap swap) {
+uint exchange(Swap swap) {
     ivec2 offset = lane_offset();
     int covered = 0;
     uint inner_turns = 0u;
@@ -356,21 +420,28 @@ void exchange(Swap swap) {
                     covered += (is ? 1 : 0) - (was ? 1 : 0);
                     depth = exchange_pixel(swap, pixel_place(uvec2(pixel)), look);
                 }
-                inner_turns += subgroupMax(depth) + 1u;
+                inner_turns += most_of_subgroup(depth) + 1u;
             }
         }
     }
-    turns += max_all(inner_turns) + boxes_turns(swap.boxes, 0u);
-    covered = subgroupAdd(covered);
-    if (subgroupElect()) {
+    covered = over_subgroup(covered);
+    if (speaks_for_subgroup()) {
         add_fitness(swap.fly, -covered * int(rule.penalties.overlap));
     }
+    return inner_turns + boxes_turns(swap.boxes, 0u);
 }
 
 void settle_fitness(uint index, Fly old, Fly child, int change) {
     if (TURN_PENALTY == 1u) {
         int before = is_alive(old) ? turn_penalty(old, local_at(old)) : 0;
         add_fitness(index, before - turn_penalty(child, local_at(child)));
+    }
+}
+
+// The table of the upper halves is clear between medians.
+void begin_stage() {
+    if (WIDE == 1u) {
+        clear_weights(0u);
     }
 }
 

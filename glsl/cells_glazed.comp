@@ -10,8 +10,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
-#extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "shared/subgroups.glsl"
 
 #include "shared/cells_stage.glsl"
 #include "shared/tile.glsl"
@@ -105,8 +104,9 @@ Folded fold(Swap swap, uint stack, uint depth, uint child_opacity) {
 struct Laid {
     // The change of the error; where the child's colour is to be found, without what shows there with it.
     int change;
-    // Pixels in the scratch that are this invocation's.
+    // Pixels in the scratch that are this invocation's, and the most that an invocation has there.
     uint own_count;
+    uint most;
     // Whether it would stack too deep on some pixel.
     bool is_crowded;
     // Whether its colour would matter anywhere.
@@ -141,7 +141,7 @@ void lay_pixel(inout Laid laid, Folded folded, uint shade, uvec4 top) {
 // Goes through the pixels of a child and its victim, and spends turns: at most `exchange_turns`. The child's colour may
 // be still to be found: then the pixels that show it are put in the scratch.
 Laid lay(Swap swap, bool has_color) {
-    Laid laid = Laid(0, 0u, false, false, uvec2[3](uvec2(0u), uvec2(0u), uvec2(0u)), uvec2(0u));
+    Laid laid = Laid(0, 0u, 0u, false, false, uvec2[3](uvec2(0u), uvec2(0u), uvec2(0u)), uvec2(0u));
     ivec2 offset = lane_offset();
     uint refused = 0u;
     uint shown = 0u;
@@ -174,12 +174,14 @@ Laid lay(Swap swap, bool has_color) {
                         laid.change += glazed_error(sums, folded.rest.transmittance, top.x, want);
                     }
                 }
-                inner_turns += stack_turns(subgroupMax(depth));
+                inner_turns += stack_turns(most_of_subgroup(depth));
             }
         }
     }
-    turns += max_all(inner_turns) + boxes_turns(swap.boxes, 0u);
-    ivec4 all = sum_all(ivec4(laid.change, refused, shown, 0));
+    uvec2 most = uvec2(inner_turns, laid.own_count);
+    ivec4 all = sum_all(ivec4(laid.change, refused, shown, 0), most);
+    turns += most.x + boxes_turns(swap.boxes, 0u);
+    laid.most = most.y;
     laid.change = all.x;
     laid.is_crowded = all.y != 0;
     laid.is_shown = all.z != 0;
@@ -243,8 +245,7 @@ bool evaluate(Candidate candidate, inout Best best) {
     }
     int change = laid.change;
     if (is_fitted) {
-        uint most = max_all(laid.own_count);
-        if (!afford(COLOR_TURNS + most)) {
+        if (!afford(COLOR_TURNS + laid.most)) {
             return false;
         }
         if (laid.is_shown) {
@@ -318,7 +319,7 @@ void exchange_pixel(Swap swap, uint place, uvec4 top, uvec2 texel) {
         uvec4(top.x & 0xFFFFFFu | count << 24, nearest.x, nearest.y | top.z & ~TOP_Z_MASK, uint(error));
 }
 
-void exchange(Swap swap) {
+uint exchange(Swap swap) {
     ivec2 offset = lane_offset();
     uint inner_turns = 0u;
     for (uint which = 0u; which < 2u; ++which) {
@@ -336,16 +337,18 @@ void exchange(Swap swap) {
                     depth = top.x >> 24;
                     exchange_pixel(swap, place, top, texel);
                 }
-                inner_turns += stack_turns(subgroupMax(depth));
+                inner_turns += stack_turns(most_of_subgroup(depth));
             }
         }
     }
-    turns += max_all(inner_turns) + boxes_turns(swap.boxes, 0u);
+    return inner_turns + boxes_turns(swap.boxes, 0u);
 }
 
 void settle_fitness(uint index, Fly old, Fly child, int change) {
     fitness[rule.first_fly + index] -= change;
 }
+
+void begin_stage() {}
 
 void end_round() {
     header[rule.lane].is_fresh = ROUND_OVER;

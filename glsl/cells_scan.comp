@@ -52,6 +52,7 @@ void main() {
         header[rule.lane].is_fresh = begins ? 1u : 0u;
         if (begins) {
             header[rule.lane].pending = total_busy;
+            header[rule.lane].under_way = round;
             // A round in which no cell has a fly is over at once.
             header[rule.lane].round = total_busy == 0u ? round + 1u : round;
         }

@@ -6,8 +6,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
-#extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "shared/subgroups.glsl"
 
 #define MASK_BINDING 10
 #include "shared/tile.glsl"
@@ -164,8 +163,8 @@ void main() {
         error_change += top_error;
         parts[pixel] = part << 10 | top_error;
     }
-    int subgroup_change = subgroupAdd(error_change);
-    if (subgroupElect()) {
+    int subgroup_change = over_subgroup(error_change);
+    if (speaks_for_subgroup()) {
         add_sum(lane.sum, subgroup_change);
     }
 }

@@ -3,8 +3,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
-#extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "shared/subgroups.glsl"
 
 #define MASK_BINDING 10
 #include "shared/tile.glsl"
@@ -67,8 +66,8 @@ void main() {
         uint target = targets[first_pixel + p * BLOCK_SIDE];
         error += (target & INSIDE) != 0u ? color_error(target, color[p]) : 0;
     }
-    int subgroup_error = subgroupAdd(error);
-    if (subgroupElect()) {
+    int subgroup_error = over_subgroup(error);
+    if (speaks_for_subgroup()) {
         add_sum(lane.sum + push.left_out_fly, subgroup_error);
     }
 }

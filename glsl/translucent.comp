@@ -8,8 +8,7 @@
 #version 460
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
-#extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_arithmetic : require
+#include "shared/subgroups.glsl"
 
 #define MASK_BINDING 9
 #include "shared/tile.glsl"
@@ -173,8 +172,8 @@ void main() {
             }
         }
     }
-    int subgroup_sum = subgroupAdd(error_sum);
-    if (subgroupElect() && subgroup_sum != 0) {
+    int subgroup_sum = over_subgroup(error_sum);
+    if (speaks_for_subgroup() && subgroup_sum != 0) {
         atomicAdd(parts[item.error], subgroup_sum);
     }
 }

@@ -3,8 +3,13 @@
 //!
 //! Nothing here names a flag of the command line or an exit code. The command line adds the flags that help.
 
+mod install;
+
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use std::{fmt, io};
+
+use self::install::{Piece, what_brings};
 
 /// Result of everything in the crate that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -69,10 +74,12 @@ pub enum Error {
         why: NoDevice,
     },
     /// The device stopped working in the middle of the work. The same work may succeed if it is tried again.
-    #[error("the Vulkan device was lost during `{last_pass}`")]
+    #[error("{}", lost(last_pass, *waited))]
     DeviceLost {
         /// Label of the last pass that was submitted.
         last_pass: String,
+        /// How long it was waited for, if the device never answered.
+        waited: Option<Duration>,
     },
     /// The device has no room for a buffer or an image.
     #[error("the Vulkan device has no memory left for {name} ({bytes} bytes)")]
@@ -128,15 +135,16 @@ pub enum Error {
 #[non_exhaustive]
 pub enum NoDevice {
     /// The Vulkan loader is not installed, or cannot be opened.
-    #[error(
-        "the Vulkan loader cannot be opened ({reason}); install libvulkan1 and a driver such as mesa-vulkan-drivers"
-    )]
+    #[error("the Vulkan loader cannot be opened ({reason}); install {}", what_brings(Piece::Loader))]
     NoLoader {
         /// What the dynamic linker said.
         reason: String,
     },
     /// The Vulkan loader is older than Vulkan 1.3.
-    #[error("the Vulkan loader only knows Vulkan {major}.{minor} and 1.3 is needed; install a newer libvulkan1")]
+    #[error(
+        "the Vulkan loader only knows Vulkan {major}.{minor} and 1.3 is needed; install {}",
+        what_brings(Piece::NewerLoader)
+    )]
     OldLoader {
         /// The first number of the loader's version.
         major: u32,
@@ -144,15 +152,19 @@ pub enum NoDevice {
         minor: u32,
     },
     /// No Vulkan driver is installed.
-    #[error("no Vulkan driver is installed; install mesa-vulkan-drivers or the driver of the GPU's vendor")]
+    #[error("no Vulkan driver is installed; install {}", what_brings(Piece::Driver))]
     NoDriver,
     /// A driver is installed, and there is nothing that it could drive.
     #[error(
-        "a Vulkan driver is installed but found no hardware that it drives; install mesa-vulkan-drivers for software Vulkan"
+        "a Vulkan driver is installed but found no hardware that it drives; install {}",
+        what_brings(Piece::FittingDriver)
     )]
     NoHardware,
     /// The validation layer was asked for and is not installed.
-    #[error("the validation layer VK_LAYER_KHRONOS_validation is not installed; install vulkan-validationlayers")]
+    #[error(
+        "the validation layer VK_LAYER_KHRONOS_validation is not installed; install {}",
+        what_brings(Piece::ValidationLayer)
+    )]
     NoValidationLayer,
     /// The device that was asked for lacks something that the engine needs.
     #[error("{device} lacks {}", missing.join(", "))]
@@ -285,6 +297,16 @@ fn told_by_system(error: &io::Error) -> String {
     letters
         .next()
         .map_or_else(|| "no reason was given".to_owned(), |first| first.to_lowercase().chain(letters).collect())
+}
+
+/// What became of a device in the middle of its work.
+fn lost(last_pass: &str, waited: Option<Duration>) -> String {
+    match waited {
+        None => format!("the Vulkan device was lost during `{last_pass}`"),
+        Some(waited) => {
+            format!("the Vulkan device did not finish `{last_pass}` within {} seconds", waited.as_secs_f64())
+        }
+    }
 }
 
 fn unlisted(request: &str, devices: &[String]) -> String {

@@ -30,6 +30,24 @@ pub const STAGES: [&str; 14] = [
     "translucent.comp",
 ];
 
+/// The stages that are compiled once more for drivers without subgroup operations: `spirv/evaluate.comp.plain.spv`.
+pub const PLAIN_STAGES: [&str; 5] =
+    ["cells.comp", "cells_glazed.comp", "evaluate.comp", "re_render.comp", "translucent.comp"];
+
+/// What those are compiled with.
+pub const PLAIN_MACRO: &str = "NO_SUBGROUPS";
+
+/// All modules: stage, and whether it is one of the plain ones.
+pub fn all_modules() -> impl Iterator<Item = (&'static str, bool)> {
+    let plain = PLAIN_STAGES.into_iter().map(|stage| (stage, true));
+    STAGES.into_iter().map(|stage| (stage, false)).chain(plain)
+}
+
+/// The file of a module in `spirv/`.
+pub fn module_file(stage: &str, is_plain: bool) -> String {
+    if is_plain { format!("{stage}.plain.spv") } else { format!("{stage}.spv") }
+}
+
 /// `spirv/MANIFEST`.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
@@ -37,15 +55,17 @@ pub struct Manifest {
     pub compiler: String,
     /// [`OPTIONS`] at the time.
     pub options: String,
-    /// One entry per stage.
+    /// One entry per module.
     pub modules: Vec<Module>,
 }
 
-/// One compiled stage.
+/// One compiled module.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Module {
     /// File name in `glsl/`.
     pub stage: String,
+    /// Whether it is for drivers without subgroup operations.
+    pub is_plain: bool,
     /// SHA-256 of the source with its includes put in place.
     pub source_sha256: String,
     /// SHA-256 of the SPIR-V.

@@ -16,22 +16,31 @@
 // bool is_useless(uint index, Fly, int fitness, out int change): whether a fly does not help; the change without it.
 // Swap swap_of(uint index, Fly old, Fly child): old is the fly of this index, and child takes its place.
 // uint exchange_turns(Swap): most turns of `exchange`.
-// void exchange(Swap): takes the old tile off its pixels, puts the new one on its own, and spends turns.
+// uint exchange(Swap): takes the old tile off its pixels and puts the new one on its own. The turns of this invocation.
 // void settle_fitness(uint index, Fly old, Fly child, int change): ends the exchange; called by one invocation.
+// void begin_stage(): done first.
 // void end_round(): called by one invocation when the last cell of the round is done.
 
 void main() {
     take_lane();
-    cell_number = work_number();
-    uint round = header[rule.lane].round;
+    cell_number = push.first_cell + work_number();
+    // Written by the scan alone. `round` and `pending` must not be read here: the last cell of the round writes them,
+    // perhaps before this workgroup begins.
+    uint round = header[rule.lane].under_way;
     grid = grid_new(search_seed(), round, picture_size(), rule.side_shift);
-    if (header[rule.lane].pending == 0u || cell_number >= grid.columns * grid.rows) {
+    if (cell_number >= grid.columns * grid.rows) {
         return;
     }
     cell = cells[rule.first_cell + cell_number];
+    // Of all records only the scan makes others than done ones, those of the cells that it counts as pending; and only
+    // a cell's own workgroup ends it. So a cell with steps left belongs to the round under way, however late it is
+    // looked at, and all others have nothing to do.
     if (cell.step == STEP_DONE) {
         return;
     }
+    begin_sums();
+    begin_tournaments();
+    begin_stage();
     // All read the step before one writes it.
     sync();
     uint chain = chain_then(chain_new(search_seed(), round, DRAW_STEP), cell_number);
@@ -49,7 +58,7 @@ void main() {
     uvec2 change_sum = uvec2(0u);
     while (step < end) {
         bool is_removal = step >= step_count;
-        uint tournaments = rule.births.place_tournament + rule.births.victim_tournament;
+        uint tournaments = tournament_turns(min(BATCH, candidates));
         uint making = STEP_TURNS
             + (is_removal ? 0u : batches * (BATCH_TURNS + tournaments) + candidates * SLOT_TURNS);
         if (!afford(making)) {
@@ -67,20 +76,24 @@ void main() {
         uint step_evals = 0u;
         bool was_changed = false;
         for (uint first = 0u; first < (is_removal || is_over ? 0u : candidates); first += BATCH) {
-            if (lane < BATCH) {
-                Candidate made =
-                    make_candidate(place, index, fly, place_fitness, chain_then(draws, first + lane + 1u));
-                store_candidate(lane, made);
+            uint slots = min(BATCH, candidates - first);
+            hold_tournaments(place_fitness, draws, first, slots);
+            if (lane < slots) {
+                uint own_draws = chain_then(draws, first + lane + 1u);
+                store_candidate(lane, make_candidate(place, index, fly, place_fitness, own_draws, slots));
             }
-            sync();
-            for (uint slot = 0u; slot < min(BATCH, candidates - first); ++slot) {
+            sync_shared();
+            for (uint slot = 0u; slot < slots; ++slot) {
                 Candidate candidate = load_candidate(slot);
                 if (candidate.is_valid && !is_over && evaluate(candidate, best)) {
                     ++step_evals;
                     was_changed = was_changed || candidate.paint != PAINT_BIRTH;
                 }
             }
-            sync();
+            // The sync at the end of the step is that of the last batch.
+            if (first + BATCH < candidates) {
+                sync_shared();
+            }
         }
         bool is_accepted = false;
         // Acceptance is 0 if neutral changes are welcome, and 1 if not.
@@ -104,13 +117,12 @@ void main() {
         if (is_over) {
             break;
         }
-        // All have read fitness, pixels and flies before any is changed.
-        sync();
         if (is_accepted) {
-            exchange(swap);
+            // All have read fitness, pixels and flies before any is changed.
+            sync();
+            turns += sync_and_most(exchange(swap));
             add_wide(change_sum, best.change);
         }
-        sync();
         if (lane == 0u) {
             if (is_accepted) {
                 Fly child = best.candidate.fly;

@@ -38,6 +38,8 @@ struct Header {
     uint change_high;
     // Dispatches of cells that had something to do.
     uint iterations;
+    // The round that the scan began last.
+    uint under_way;
 };
 
 struct CellRecord {
@@ -57,6 +59,8 @@ layout(push_constant) uniform Push {
     uint first_lane;
     // Most turns of loops in one invocation.
     uint budget;
+    // The cell that workgroup 0 of a lane works on.
+    uint first_cell;
 } push;
 
 // Of the lanes that work, those of a kind side by side.

@@ -106,43 +106,137 @@ Candidate load_candidate(uint slot) {
     return candidate;
 }
 
-// The place of who leaves for a new tile: the least helpful of some random flies of the cell.
-uint victim_of(uint draws) {
-    int least = 0x7FFFFFFF;
-    uint best = 0u;
-    for (uint number = 0u; number < rule.births.victim_tournament; ++number) {
-        uint place = chain_below(draws, SLOT_VICTIM + number, cell.count);
-        int value = fitness[rule.first_fly + member(place)];
-        best = value < least ? place : best;
-        least = min(value, least);
-    }
-    return best;
+// Who wins a tournament: the smallest value, and of equals the smallest number.
+struct Winner {
+    int value;
+    uint number;
+};
+
+const Winner NO_WINNER = Winner(0x7FFFFFFF, 0xFFFFFFFFu);
+
+Winner better(Winner one, int value, uint number) {
+    return value < one.value || value == one.value && number < one.number ? Winner(value, number) : one;
 }
 
-// The worst of some random pixels of the cell, and the depth of what shows there.
-uvec3 worst_pixel(uint draws) {
-    uvec4 bounds = grid_bounds(grid, cell_number);
-    int worst = -1;
-    uvec3 best = uvec3(bounds.xy, 0u);
-    for (uint number = 0u; number < rule.births.place_tournament; ++number) {
-        uint bits = chain_bits(draws, SLOT_PLACE + number);
-        uvec2 pixel = bounds.xy
-            + uvec2(below(bits << 16, bounds.z - bounds.x), below(bits & 0xFFFF0000u, bounds.w - bounds.y));
-        uvec4 shown = pixels[2u * pixel_place(pixel)];
-        best = int(shown.w) > worst ? uvec3(pixel, shown.z & TOP_Z_MASK) : best;
-        worst = max(int(shown.w), worst);
+uint victim_place(uint draws, uint number) {
+    return chain_below(draws, SLOT_VICTIM + number, cell.count);
+}
+
+// The least helpful of some random flies of the cell, who leaves for a new tile: of every so many from the first one.
+Winner least_helpful(uint draws, uint first, uint stride) {
+    Winner winner = NO_WINNER;
+    for (uint number = first; number < rule.births.victim_tournament; number += stride) {
+        winner = better(winner, fitness[rule.first_fly + member(victim_place(draws, number))], number);
     }
-    return best;
+    return winner;
+}
+
+// A random pixel of the cell.
+uvec2 pixel_of(uint draws, uint number) {
+    uvec4 bounds = grid_bounds(grid, cell_number);
+    uint bits = chain_bits(draws, SLOT_PLACE + number);
+    return bounds.xy + uvec2(below(bits << 16, bounds.z - bounds.x), below(bits & 0xFFFF0000u, bounds.w - bounds.y));
+}
+
+// The worst of some random pixels of the cell: of every so many from the first one.
+Winner worst_shown(uint draws, uint first, uint stride) {
+    Winner winner = NO_WINNER;
+    for (uint number = first; number < rule.births.place_tournament; number += stride) {
+        winner = better(winner, -int(pixels[2u * pixel_place(pixel_of(draws, number))].w), number);
+    }
+    return winner;
+}
+
+bool is_birth(int place_fitness, uint draws) {
+    return place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.mix.birth_q16;
+}
+
+// Winners of the tournaments of each candidate, found by several invocations; between batches nobody has won. First the
+// value, then the number.
+shared int shared_values[2u * BATCH_MAX];
+shared uint shared_numbers[2u * BATCH_MAX];
+
+void clear_winners(uint slot) {
+    shared_values[slot] = NO_WINNER.value;
+    shared_values[BATCH_MAX + slot] = NO_WINNER.value;
+    shared_numbers[slot] = NO_WINNER.number;
+    shared_numbers[BATCH_MAX + slot] = NO_WINNER.number;
+}
+
+// Done first, before a `sync`.
+void begin_tournaments() {
+    for (uint slot = gl_LocalInvocationID.x; slot < BATCH_MAX; slot += LANES) {
+        clear_winners(slot);
+    }
+}
+
+// How many invocations share the tournaments of a candidate.
+uint helpers_of(uint slots) {
+    return LANES / slots;
+}
+
+// Finds the winners for so many candidates that are made next, if several invocations share in each.
+void hold_tournaments(int place_fitness, uint draws, uint first, uint slots) {
+    uint helpers = helpers_of(slots);
+    if (helpers == 1u) {
+        return;
+    }
+    uint slot = gl_LocalInvocationID.x / helpers;
+    uint own = gl_LocalInvocationID.x % helpers;
+    uint own_draws = chain_then(draws, first + slot + 1u);
+    bool takes_part = slot < slots && is_birth(place_fitness, own_draws);
+    // The same in all invocations.
+    if (slots == 1u && !takes_part) {
+        return;
+    }
+    Winner victim = NO_WINNER;
+    Winner place = NO_WINNER;
+    if (takes_part) {
+        if (place_fitness > 0) {
+            victim = least_helpful(own_draws, own, helpers);
+            atomicMin(shared_values[slot], victim.value);
+        }
+        if (MUTANTS == 0u) {
+            place = worst_shown(own_draws, own, helpers);
+            atomicMin(shared_values[BATCH_MAX + slot], place.value);
+        }
+    }
+    sync_shared();
+    if (takes_part) {
+        if (victim.value == shared_values[slot]) {
+            atomicMin(shared_numbers[slot], victim.number);
+        }
+        if (place.value == shared_values[BATCH_MAX + slot]) {
+            atomicMin(shared_numbers[BATCH_MAX + slot], place.number);
+        }
+    }
+    sync_shared();
+}
+
+// Turns of the loops of the tournaments of a batch.
+uint tournament_turns(uint slots) {
+    uint helpers = helpers_of(slots);
+    return (rule.births.place_tournament + helpers - 1u) / helpers
+        + (rule.births.victim_tournament + helpers - 1u) / helpers;
 }
 
 GuideSample local_at(Fly fly) {
     return guide_at(ivec2(fly.x, fly.y) >> 6);
 }
 
-void make_birth(inout Candidate candidate, uint place, int place_fitness, uint draws) {
+// Whoever makes a candidate alone also holds its tournaments.
+void make_birth(inout Candidate candidate, uint place, int place_fitness, uint draws, uint slots) {
+    uint slot = gl_LocalInvocationID.x;
+    uint victim_number = shared_numbers[slot];
+    uint place_number = shared_numbers[BATCH_MAX + slot];
+    if (helpers_of(slots) == 1u) {
+        victim_number = least_helpful(draws, 0u, 1u).number;
+        place_number = MUTANTS == 1u ? 0u : worst_shown(draws, 0u, 1u).number;
+    } else {
+        clear_winners(slot);
+    }
     candidate.paint = PAINT_BIRTH;
-    uint helpless = victim_of(draws);
-    candidate.victim = place_fitness <= 0 ? place : helpless;
+    candidate.victim = place_fitness <= 0 ? place : victim_place(draws, victim_number);
     uint index = member(candidate.victim);
     if (MUTANTS == 1u) {
         uint parent = member(chain_below(draws, SLOT_PLACE, cell.count));
@@ -150,9 +244,10 @@ void make_birth(inout Candidate candidate, uint place, int place_fitness, uint d
         Fly fly = flies[rule.first_fly + parent];
         candidate.fly = mutant(fly, own_side(index, local_at(fly)), draws);
     } else {
-        uvec3 worst = worst_pixel(draws);
-        GuideSample local = guide_at(ivec2(worst.xy));
-        candidate.fly = newborn(own_side(index, local), worst.xy, worst.z, local, draws);
+        uvec2 worst = pixel_of(draws, place_number);
+        uint z = pixels[2u * pixel_place(worst)].z & TOP_Z_MASK;
+        GuideSample local = guide_at(ivec2(worst));
+        candidate.fly = newborn(own_side(index, local), worst, z, local, draws);
     }
 }
 
@@ -182,14 +277,15 @@ void make_change(inout Candidate candidate, Fly fly, uint index, uint step, uint
     }
 }
 
-// Makes a child of the fly at a place among the members, or a birth, and says whether it is within its cell.
-Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uint draws) {
+// Makes a child of the fly at a place among the members, or a birth, one of so many, and says whether it is within its
+// cell.
+Candidate make_candidate(uint place, uint index, Fly fly, int place_fitness, uint draws, uint slots) {
     Candidate candidate;
     candidate.fly = fly;
     candidate.victim = place;
     candidate.is_valid = true;
-    if (place_fitness <= 0 || chain_bits(draws, SLOT_KIND) >> 16 < rule.mix.birth_q16) {
-        make_birth(candidate, place, place_fitness, draws);
+    if (is_birth(place_fitness, draws)) {
+        make_birth(candidate, place, place_fitness, draws, slots);
     } else {
         make_change(candidate, fly, index, steps[rule.first_fly + index], draws);
     }

@@ -4,7 +4,7 @@
 //! command_line   all commands; help: how it is arranged; hints: what is said to wrong ones
 //!   commands     one module for each command; they do not know each other
 //!     list       pictures of a batch        film     animations        mosaics   many mosaics of the paper
-//!       jobs     one picture at work: read, evolved, drawn, and what is told of it
+//!       jobs     one picture at work: read, evolved, drawn, and what is told of it; checks: devices against the CPU
 //!         args   flags that several commands share, and what they ask of the library
 //!           trace    traces and captures
 //!             files    outputs, what is in them, and whether they may be replaced
@@ -17,6 +17,7 @@
 
 mod args;
 mod built_in;
+mod checks;
 mod command_line;
 mod commands;
 mod config;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::lane_buffers::{LaneBuffers, Part, Room};
 use super::layout::{EvaluatePush, FLAG_CONTINUED, FLAG_UNFINISHED, WorkItem};
-use super::shaders;
+use super::shaders::{self, Twofold};
 use crate::error::Result;
 use crate::model::mask::{TEXELS, Texel};
 use crate::model::{Blend, MaskSet, Scene};
@@ -228,14 +228,14 @@ fn storage(device: &Arc<Device>, name: &str, bytes: usize) -> Result<Arc<Buffer>
 
 /// The kernel in one of its variants.
 fn create_pipeline(device: &Arc<Device>, variant: Variant) -> Result<Arc<ComputePipeline>> {
-    create_kernel(device, "evaluate", shaders::EVALUATE, &variant.specialization(), size_of::<EvaluatePush>())
+    create_kernel(device, "evaluate", &shaders::EVALUATE, &variant.specialization(), size_of::<EvaluatePush>())
 }
 
 /// A kernel with this pass's bindings, by its stem and its module.
 pub(super) fn create_kernel(
     device: &Arc<Device>,
     name: &str,
-    module: &[u8],
+    module: &Twofold,
     specialization: &[(u32, u32)],
     push_constant_bytes: usize,
 ) -> Result<Arc<ComputePipeline>> {
@@ -243,7 +243,7 @@ pub(super) fn create_kernel(
         device,
         &ComputeShader {
             name,
-            spirv: &shaders::words(module),
+            spirv: &shaders::words(module.for_device(device.info())),
             specialization,
             bindings: &[BindingKind::StorageBuffer; 11],
             push_constant_bytes: push_constant_bytes as u32,

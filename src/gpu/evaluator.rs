@@ -6,11 +6,15 @@ use super::evaluate::{EvaluatePass, KernelShape};
 use super::lane::{GpuLane, Unread, is_translucent};
 use super::lane_buffers::{Part, Room};
 use super::layout::Tile;
+use super::pace::Pace;
 use super::translucent::{Extent, TranslucentPass};
 use super::work::Work;
 use crate::error::{Error, Remedy, Result};
 use crate::model::{Blend, Change, Evaluation, Evaluator, Fly, Lane, Layers, Scene};
 use crate::vk::{Device, PassTime, Recorder, Timing};
+
+/// Work items of the first submission to hardware of unknown speed: the blocks of a picture of 512 px, and more.
+const ITEMS_FIRST: u64 = 4_096;
 
 /// The evaluator of a Vulkan device.
 pub struct GpuEvaluator {
@@ -22,6 +26,8 @@ pub struct GpuEvaluator {
     /// By number, without those that were released.
     pub(super) lanes: Vec<Option<GpuLane>>,
     pub(super) work: Work,
+    /// In work items.
+    pub(super) pace: Pace,
 }
 
 impl GpuEvaluator {
@@ -46,6 +52,7 @@ impl GpuEvaluator {
             translucent: None,
             lanes: Vec::with_capacity(scenes.len()),
             work: Work::default(),
+            pace: Pace::for_kind(device.info().kind, ITEMS_FIRST),
         };
         evaluator.make_room_for_translucent(&scenes.iter().collect::<Vec<_>>())?;
         for scene in scenes {

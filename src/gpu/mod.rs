@@ -10,6 +10,7 @@ mod lane;
 mod lane_buffers;
 pub mod layout;
 mod mosaic;
+mod pace;
 mod painter;
 mod pools;
 mod re_render;

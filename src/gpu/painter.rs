@@ -1,10 +1,11 @@
 //! The painter of a Vulkan device: opaque tiles by the graphics pass, translucent ones by the compute pass that
-//! composites.
+//! composites. Where the device has no graphics, the twin draws the opaque ones.
 
 use std::sync::Arc;
 
 use super::compose::ComposePass;
 use super::mosaic::MosaicPass;
+use crate::cpu::CpuPainter;
 use crate::error::Result;
 use crate::model::{Blend, Canvas, Mosaic, Painter, Population};
 use crate::vk::{Device, Recorder, Timing};
@@ -27,7 +28,7 @@ impl GpuPainter {
     /// The fly that shows at each pixel as the graphics pass draws it, or [`crate::model::NO_FLY`].
     ///
     /// # Errors
-    /// If the device fails.
+    /// If the device fails, or has no graphics.
     pub fn draw_fly_layer(&mut self, population: &Population) -> Result<Vec<u32>> {
         let canvas = Canvas::evaluation(population.width_px, population.height_px);
         MosaicPass::create(&self.device, &mut self.recorder, population, &canvas)?.draw_fly_layer(&mut self.recorder)
@@ -45,6 +46,9 @@ impl Painter for GpuPainter {
         if population.masks.blend() == Blend::Translucent {
             let pass = ComposePass::create(&self.device, &mut self.recorder, population, canvas, supersampling)?;
             return pass.draw(&mut self.recorder, canvas, supersampling, watch);
+        }
+        if !self.device.info().can_draw() {
+            return CpuPainter.draw_watched(population, canvas, supersampling, watch);
         }
         let samples = canvas.supersampled(supersampling);
         let pass = MosaicPass::create(&self.device, &mut self.recorder, population, &samples)?;

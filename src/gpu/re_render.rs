@@ -37,7 +37,7 @@ impl GpuEvaluator {
         let bytes = u64::from(fly_count) * 8;
         let sums = Buffer::create(&self.device, "re-render sums", bytes, BufferUse::Storage, Residence::Device)?;
         let (constants, push_bytes) = (self.pass.variant.specialization(), size_of::<ReRenderPush>());
-        let pipeline = create_kernel(&self.device, "re_render", shaders::RE_RENDER, &constants, push_bytes)?;
+        let pipeline = create_kernel(&self.device, "re_render", &shaders::RE_RENDER, &constants, push_bytes)?;
         let group = self.pass.bind_with_sums(&pipeline, &sums)?;
         self.recorder.write_buffer(&sums, 0, &vec![0; bytes as usize])?;
         for first in (0..fly_count).step_by(RE_RENDERS_PER_SUBMISSION as usize) {

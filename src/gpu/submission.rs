@@ -87,7 +87,8 @@ impl GpuEvaluator {
     fn push_piece(&mut self, pending: Pending, first_flags: u32, rest: &mut Vec<Pending>) -> Result<()> {
         let list_length = self.known(pending.lane).lane.lists().list(pending.block as usize).len();
         let piece = pending.from..list_length.min(pending.from + LIST_PIECE);
-        let is_full = self.work.items.len() == self.pass.item_capacity()
+        let items_max = (self.pass.item_capacity() as u64).min(self.pace.units());
+        let is_full = self.work.items.len() as u64 >= items_max
             || self.work.entries.len() + piece.len() > self.pass.entry_capacity();
         if is_full {
             self.submit(&[])?;
@@ -140,6 +141,7 @@ impl GpuEvaluator {
         let sums_ticket =
             if tickets.is_empty() { None } else { Some(recorder.read_buffer(sums, 0, sums.size_bytes())?) };
         recorder.submit_and_wait()?;
+        self.pace.note(work.items.len() as u64, recorder.took());
         if let (Some(translucent), Some(parts)) = (&mut self.translucent, parts) {
             translucent.absorb(recorder, &parts)?;
         }

@@ -409,7 +409,7 @@ fn create_pipeline(device: &Arc<Device>, shape: KernelShape) -> Result<Arc<Compu
         device,
         &ComputeShader {
             name: "translucent",
-            spirv: &shaders::words(shaders::TRANSLUCENT),
+            spirv: &shaders::words(shaders::TRANSLUCENT.for_device(device.info())),
             specialization: &shape.specialization(),
             bindings: &[BindingKind::StorageBuffer; 10],
             push_constant_bytes: size_of::<TranslucentPush>() as u32,

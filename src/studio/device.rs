@@ -2,7 +2,9 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::time::Duration;
 
+use super::stand_in::{EvaluatorOrTwin, LanesOrTwins, PainterOrTwin, SearchOrTwin, StandIn, Tell};
 use crate::cpu::cells::CpuSearch;
 use crate::cpu::{CpuEvaluator, CpuPainter};
 use crate::engine::Crew;
@@ -46,6 +48,20 @@ struct Opened {
     /// Whether somebody asked for Vulkan; else the CPU may stand in for it.
     is_asked_for: bool,
     keeper: Option<Arc<dyn PipelineKeeper>>,
+    /// Makes the rest if the device is lost; if none, its loss is an error.
+    stand_in: Option<StandIn>,
+}
+
+/// How a device is opened.
+#[derive(Clone, Default)]
+pub(crate) struct Opening {
+    pub validation: Validation,
+    /// Keeps what its driver compiles.
+    pub keeper: Option<Arc<dyn PipelineKeeper>>,
+    /// How long a submission to hardware may last, if not as long as usual.
+    pub patience: Option<Duration>,
+    /// Is called when the device is lost, after which the CPU makes the rest. Without it the loss is an error.
+    pub on_lost: Option<Arc<Tell>>,
 }
 
 impl Drop for Opened {
@@ -102,18 +118,14 @@ pub(crate) struct OpenedSearch {
 /// # Errors
 /// [`Error::NoSuitableDevice`] if there is none, or if Vulkan or its validation layer is asked for and missing;
 /// [`Error::Vulkan`] if a device that was asked for cannot be opened.
-pub(crate) fn select(
-    request: &DeviceRequest,
-    validation: Validation,
-    keeper: Option<&Arc<dyn PipelineKeeper>>,
-) -> Result<Device> {
+pub(crate) fn select(request: &DeviceRequest, opening: &Opening) -> Result<Device> {
     if *request == DeviceRequest::Cpu {
         return Ok(Device::cpu());
     }
-    let is_asked_for = *request != DeviceRequest::Auto || validation == Validation::On;
-    let found = find(request, validation).and_then(|found| match found {
+    let is_asked_for = *request != DeviceRequest::Auto || opening.validation == Validation::On;
+    let found = find(request, opening.validation).and_then(|found| match found {
         Found::Cpu { reason } => Ok(Device { kind: Kind::Cpu { reason: Some(reason) } }),
-        Found::Vulkan(instance, info) => open(&instance, &info, is_asked_for, keeper),
+        Found::Vulkan(instance, info) => open(&instance, &info, is_asked_for, opening),
     });
     unless_nobody_asked(found, is_asked_for)
 }
@@ -122,28 +134,25 @@ pub(crate) fn select(
 ///
 /// # Errors
 /// [`Error::NoSuitableDevice`] if there is none; [`Error::Vulkan`] if one of them cannot be opened.
-pub(crate) fn select_all(validation: Validation, keeper: Option<&Arc<dyn PipelineKeeper>>) -> Result<Vec<Device>> {
-    let instance = Instance::create(InstanceOptions { validation })?;
+pub(crate) fn select_all(opening: &Opening) -> Result<Vec<Device>> {
+    let instance = Instance::create(InstanceOptions { validation: opening.validation })?;
     let devices = instance.physical_devices()?;
     let gpus: Vec<&DeviceInfo> = devices.iter().filter(|info| info.kind != DeviceKind::Cpu).collect();
     if gpus.is_empty() {
         return Err(Error::NoSuitableDevice { why: NoDevice::NoGpu });
     }
-    gpus.iter().map(|info| open(&instance, info, true, keeper)).collect()
+    gpus.iter().map(|info| open(&instance, info, true, opening)).collect()
 }
 
 /// Opens a device, with the pipelines that were kept of it.
-fn open(
-    instance: &Arc<Instance>,
-    info: &DeviceInfo,
-    is_asked_for: bool,
-    keeper: Option<&Arc<dyn PipelineKeeper>>,
-) -> Result<Device> {
-    let pipeline_cache = keeper.map_or_else(Vec::new, |keeper| keeper.read(info));
-    let device = vk::Device::create(instance, info, &DeviceOptions { pipeline_cache, ..DeviceOptions::default() })?;
+fn open(instance: &Arc<Instance>, info: &DeviceInfo, is_asked_for: bool, opening: &Opening) -> Result<Device> {
+    let pipeline_cache = opening.keeper.as_ref().map_or_else(Vec::new, |keeper| keeper.read(info));
+    let options = DeviceOptions { pipeline_cache, patience: opening.patience, ..DeviceOptions::default() };
+    let device = vk::Device::create(instance, info, &options)?;
     let validation_log = Arc::clone(instance.validation_log());
-    let keeper = keeper.map(Arc::clone);
-    Ok(Device { kind: Kind::Vulkan(Opened { device, validation_log, is_asked_for, keeper }) })
+    let keeper = opening.keeper.clone();
+    let stand_in = opening.on_lost.clone().map(StandIn::new);
+    Ok(Device { kind: Kind::Vulkan(Opened { device, validation_log, is_asked_for, keeper, stand_in }) })
 }
 
 /// What a request comes to.
@@ -200,7 +209,7 @@ impl Device {
     /// # Errors
     /// None today: wherever Vulkan fails, the CPU stands in.
     pub fn auto() -> Result<Self> {
-        select(&DeviceRequest::Auto, Validation::Off, None)
+        select(&DeviceRequest::Auto, &Opening::default())
     }
 
     /// The CPU.
@@ -216,7 +225,7 @@ impl Device {
     /// [`Error::Parameter`] if the name has no such form; [`Error::NoSuitableDevice`] if there is no such device;
     /// [`Error::Vulkan`] if it cannot be opened.
     pub fn named(name: &str) -> Result<Self> {
-        select(&name.parse()?, Validation::Off, None)
+        select(&name.parse()?, &Opening::default())
     }
 
     /// The device's name, for people.
@@ -250,25 +259,40 @@ impl Device {
         if let Kind::Vulkan(opened) = &self.kind { Some(&opened.device) } else { None }
     }
 
+    /// The Vulkan device unless it is lost, and what stands in for it.
+    fn at_work(&self) -> Option<(&Arc<vk::Device>, Option<&StandIn>)> {
+        let Kind::Vulkan(Opened { device, stand_in, .. }) = &self.kind else { return None };
+        let is_lost = stand_in.as_ref().is_some_and(StandIn::is_needed);
+        (!is_lost).then_some((device, stand_in.as_ref()))
+    }
+
     /// An evaluator with one lane per scene on this device.
     ///
     /// # Errors
     /// If the device has no room for the scenes.
     pub(crate) fn open_evaluator(&self, scenes: Vec<Scene>) -> Result<Box<dyn Evaluator>> {
-        Ok(match self.vulkan() {
+        Ok(match self.at_work() {
             None => Box::new(CpuEvaluator::new(scenes)),
-            Some(device) => Box::new(GpuEvaluator::create(device, scenes)?),
+            Some((device, None)) => Box::new(GpuEvaluator::create(device, scenes)?),
+            Some((device, Some(stand_in))) => match GpuEvaluator::create(device, scenes.clone()) {
+                Err(error) if stand_in.takes_over(&error) => Box::new(CpuEvaluator::new(scenes)),
+                made => Box::new(EvaluatorOrTwin::new(Box::new(made?), scenes, stand_in.clone())),
+            },
         })
     }
 
-    /// A painter on this device.
+    /// A painter on this device. Where the device cannot draw, the CPU twin does it: it comes to the same bytes.
     ///
     /// # Errors
     /// If the device fails.
     pub(crate) fn open_painter(&self) -> Result<Box<dyn Painter>> {
-        Ok(match self.vulkan() {
+        Ok(match self.at_work() {
             None => Box::new(CpuPainter),
-            Some(device) => Box::new(GpuPainter::create(device)?),
+            Some((device, None)) => Box::new(GpuPainter::create(device)?),
+            Some((device, Some(stand_in))) => match GpuPainter::create(device) {
+                Err(error) if stand_in.takes_over(&error) => Box::new(CpuPainter),
+                made => Box::new(PainterOrTwin::new(Box::new(made?), stand_in.clone())),
+            },
         })
     }
 
@@ -306,6 +330,11 @@ impl Device {
         }
     }
 
+    /// What the device lacks for drawing, in words; empty if it draws by itself.
+    pub(crate) fn missing_for_drawing(&self) -> &[String] {
+        self.vulkan().map_or(&[], |device| device.info().missing_for_drawing.as_slice())
+    }
+
     /// Name and version of the Vulkan driver.
     pub(crate) fn driver(&self) -> Option<String> {
         let info = self.vulkan()?.info();
@@ -319,10 +348,19 @@ impl Device {
     /// If a device that was asked for has no room for the search, or its numbers do not fit it.
     pub(crate) fn open_search(&self, course: Course) -> Result<OpenedSearch> {
         let on_cpu = |course, stand_in| OpenedSearch { search: Box::new(CpuSearch::new(course)), stand_in };
-        let Kind::Vulkan(Opened { device, is_asked_for, .. }) = &self.kind else { return Ok(on_cpu(course, None)) };
-        match VulkanSearch::new(device, course.clone()) {
-            Ok(search) => Ok(OpenedSearch { search: Box::new(search), stand_in: None }),
-            Err(error) if !is_asked_for => Ok(on_cpu(course, Some(why_no_vulkan(&error)))),
+        let Some((device, stand_in)) = self.at_work() else { return Ok(on_cpu(course, None)) };
+        let opened: Result<Box<dyn Search>> = match stand_in {
+            None => VulkanSearch::new(device, course.clone()).map(|search| -> Box<dyn Search> { Box::new(search) }),
+            Some(stand_in) => VulkanLanes::create(device, Timing::Off)
+                .and_then(|lanes| {
+                    SearchOrTwin::new(LanesOrTwins::new(Box::new(lanes), stand_in.clone()), course.clone())
+                })
+                .map(|search| -> Box<dyn Search> { Box::new(search) }),
+        };
+        match opened {
+            Ok(search) => Ok(OpenedSearch { search, stand_in: None }),
+            Err(error) if stand_in.is_some_and(|stand_in| stand_in.takes_over(&error)) => Ok(on_cpu(course, None)),
+            Err(error) if !self.is_asked_for() => Ok(on_cpu(course, Some(why_no_vulkan(&error)))),
             Err(error) => Err(error),
         }
     }

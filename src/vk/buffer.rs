@@ -53,7 +53,7 @@ impl Buffer {
         residence: Residence,
     ) -> Result<Arc<Self>> {
         if usage == BufferUse::Storage {
-            check_storage_size(name, size_bytes, device.info().limits.storage_buffer_bytes)?;
+            check_storage_size(name, size_bytes, device.info().limits.largest_storage_buffer_bytes())?;
         }
         let mut flags = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
         if usage == BufferUse::Storage {

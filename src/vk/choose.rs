@@ -186,6 +186,8 @@ mod tests {
             subgroup_operations: Vec::new(),
             limits: DeviceLimits {
                 storage_buffer_bytes: 1 << 27,
+                buffer_bytes: 1 << 30,
+                allocation_bytes: 1 << 30,
                 storage_buffers_per_stage: 16,
                 workgroups: [65_535; 3],
                 workgroup_invocations: 1024,
@@ -197,6 +199,7 @@ mod tests {
                 timestamp_bits: 64,
             },
             missing: Vec::new(),
+            missing_for_drawing: Vec::new(),
         }
     }
 
@@ -267,6 +270,15 @@ mod tests {
         let mut devices = machine();
         devices[3].missing.push("Vulkan 1.3".to_owned());
         assert_eq!(chosen("auto", &devices)?, Choice::Vulkan(4));
+        Ok(())
+    }
+
+    #[test]
+    fn a_gpu_that_cannot_draw_is_taken_all_the_same() -> Result<()> {
+        let mut devices = machine();
+        devices[3].missing_for_drawing.push("a queue for graphics".to_owned());
+        assert_eq!(chosen("auto", &devices)?, Choice::Vulkan(3));
+        assert_eq!(chosen("name:large", &devices)?, Choice::Vulkan(3));
         Ok(())
     }
 

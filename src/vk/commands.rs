@@ -62,24 +62,64 @@ pub(super) fn run_once(device: &Arc<Device>, name: &str, record: impl FnOnce(vk:
     begin_commands(device, commands)?;
     record(commands);
     end_commands(device, commands)?;
-    let infos = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+    let fence = create_fence(device, name)?;
+    run_and_wait(device, &[commands], fence.get(), name)
+}
+
+/// Creates a fence that nothing was submitted with yet.
+pub(super) fn create_fence(device: &Arc<Device>, name: &str) -> Result<Owned<vk::Fence>> {
+    // SAFETY: V1.
+    let fence = unsafe { device.raw().create_fence(&vk::FenceCreateInfo::default(), None) }
+        .map_err(|result| call_failed(format!("creation of the fence of {name}"), result))?;
+    Ok(Owned::new(device, fence, name))
+}
+
+/// Runs command buffers and waits until they are over, as long as the device has patience. Afterwards nothing that
+/// they use is in use, or else the device is given up.
+pub(super) fn run_and_wait(
+    device: &Arc<Device>,
+    commands: &[vk::CommandBuffer],
+    fence: vk::Fence,
+    last_pass: &str,
+) -> Result<()> {
+    let failed = |call: &str, result| submission_failed(call, result, last_pass);
+    if device.is_given_up() {
+        return Err(failed("vkQueueSubmit2", vk::Result::ERROR_DEVICE_LOST));
+    }
+    let infos: Vec<_> =
+        commands.iter().map(|&commands| vk::CommandBufferSubmitInfo::default().command_buffer(commands)).collect();
     let submits = [vk::SubmitInfo2::default().command_buffer_infos(&infos)];
-    let failed = |call: &str, result| submission_failed(call, result, name);
-    let queue = device.queue();
-    // SAFETY: V1, V2, V3: the pool is dropped after the queue is idle.
-    unsafe {
-        device
-            .raw()
-            .queue_submit2(*queue, &submits, vk::Fence::null())
-            .map_err(|result| failed("vkQueueSubmit2", result))?;
-        device.raw().queue_wait_idle(*queue).map_err(|result| failed("vkQueueWaitIdle", result))
+    let fences = [fence];
+    {
+        let queue = device.queue();
+        // SAFETY: V1, V2, V3: the fence is not in use, since every submission is waited for.
+        unsafe {
+            device.raw().reset_fences(&fences).map_err(|result| failed("vkResetFences", result))?;
+            device.raw().queue_submit2(*queue, &submits, fence).map_err(|result| failed("vkQueueSubmit2", result))?;
+        }
+    }
+    let patience = device.patience();
+    let most_ns = patience.map_or(u64::MAX, |patience| u64::try_from(patience.as_nanos()).unwrap_or(u64::MAX));
+    // SAFETY: V1.
+    match unsafe { device.raw().wait_for_fences(&fences, true, most_ns) } {
+        Ok(()) => Ok(()),
+        Err(vk::Result::TIMEOUT) => {
+            // V2: what the commands use must not be destroyed any more, and nothing can be waited for.
+            device.give_up();
+            Err(Error::DeviceLost { last_pass: last_pass.to_owned(), waited: patience })
+        }
+        Err(result) => {
+            // V2: the objects that the commands use are dropped next.
+            device.wait_idle();
+            Err(failed("vkWaitForFences", result))
+        }
     }
 }
 
 /// The error of a failed submission. A lost device and full memory have variants of their own; both name the last pass.
 pub(super) fn submission_failed(call: &str, result: vk::Result, last_pass: &str) -> Error {
     match result {
-        vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { last_pass: last_pass.to_owned() },
+        vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { last_pass: last_pass.to_owned(), waited: None },
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
             Error::OutOfMemory { call: format!("{call} after pass {last_pass}") }
         }
@@ -94,7 +134,7 @@ mod tests {
     #[test]
     fn a_lost_device_is_told_with_the_last_pass() {
         let lost = submission_failed("vkQueueSubmit2", vk::Result::ERROR_DEVICE_LOST, "evaluate");
-        assert!(matches!(&lost, Error::DeviceLost { last_pass } if last_pass == "evaluate"));
+        assert!(matches!(&lost, Error::DeviceLost { last_pass, waited: None } if last_pass == "evaluate"));
         let other = submission_failed("vkQueueSubmit2", vk::Result::ERROR_UNKNOWN, "evaluate");
         assert!(other.to_string().contains("vkQueueSubmit2 after pass evaluate"), "{other}");
     }

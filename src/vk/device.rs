@@ -1,21 +1,26 @@
-//! The logical device: one queue for graphics and compute, the memory allocator and the pipeline cache.
+//! The logical device: one queue that computes and, if the device can, draws; the memory allocator and the pipeline
+//! cache.
 
 use std::ffi::{CStr, CString};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use ash::ext::debug_utils;
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
+use super::abilities;
 use super::observe::{Calibrated, clock_extension};
-use super::physical::{self, DeviceInfo};
+use super::physical::{self, DeviceInfo, DeviceKind};
 use super::{Instance, SubmissionObserver, call_failed, lock, refused};
 use crate::error::{Error, NoDevice, Result};
 
 const PORTABILITY_SUBSET: &CStr = c"VK_KHR_portability_subset";
 const MIB: u64 = 1 << 20;
+/// A submission is meant to last tenths of a second.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// How bytes reach buffers on the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -32,6 +37,9 @@ pub enum Staging {
 pub struct DeviceOptions {
     /// How bytes reach buffers on the device.
     pub staging: Staging,
+    /// How long a submission to hardware may last; two minutes if nothing is said. Software Vulkan never hangs, it is
+    /// only slow, so that it is always waited for.
+    pub patience: Option<Duration>,
     /// What [`Device::pipeline_cache_bytes`] returned earlier, perhaps for another device or driver; empty if there is
     /// none.
     pub pipeline_cache: Vec<u8>,
@@ -44,6 +52,10 @@ pub struct Device {
     queue: Mutex<vk::Queue>,
     queue_family: u32,
     staging: Staging,
+    patience: Option<Duration>,
+    /// Whether a submission outlasted the patience. The device may still use all that it ever was given, so that
+    /// nothing of it is destroyed any more.
+    is_given_up: AtomicBool,
     recordings: AtomicU64,
     submissions: AtomicU64,
     pub(super) observers: Mutex<Vec<Arc<dyn SubmissionObserver>>>,
@@ -69,15 +81,17 @@ impl Drop for RawDevice {
 }
 
 impl Device {
-    /// Opens the device that `info` describes.
+    /// Opens the device that `info` describes. If it lacks something for drawing, it is opened without what only
+    /// drawing needs.
     ///
     /// # Errors
     /// [`Error::NoSuitableDevice`] if it lacks something or is no longer there; [`Error::Vulkan`] if the driver
     /// refuses.
     pub fn create(instance: &Arc<Instance>, info: &DeviceInfo, options: &DeviceOptions) -> Result<Arc<Self>> {
         let physical = find_physical(instance, info)?;
-        let (queue_family, _) = physical::queue_family(instance.raw(), physical)
-            .ok_or_else(|| lacks(info, vec!["a queue for graphics and compute".to_owned()]))?;
+        let queue_family = abilities::queue_family(instance.raw(), physical)
+            .ok_or_else(|| lacks(info, vec![abilities::COMPUTE_QUEUE.to_owned()]))?
+            .index;
         let clock = clock_extension(instance, physical)?;
         let functions = create_raw(instance, physical, info, queue_family, clock)?;
         let debug_utils = instance.has_debug_utils().then(|| debug_utils::Device::new(instance.raw(), &functions));
@@ -105,6 +119,8 @@ impl Device {
             queue: Mutex::new(queue),
             queue_family,
             staging: options.staging,
+            patience: (info.kind != DeviceKind::Cpu).then(|| options.patience.unwrap_or(PATIENCE)),
+            is_given_up: AtomicBool::new(false),
             recordings: AtomicU64::new(0),
             submissions: AtomicU64::new(0),
             observers: Mutex::default(),
@@ -121,6 +137,14 @@ impl Device {
     #[must_use]
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Refuses `call`, which only a device that can draw may be asked for.
+    pub(super) fn require_drawing(&self, call: &str) -> Result<()> {
+        if self.info.can_draw() {
+            return Ok(());
+        }
+        Err(refused(call, format!("the device cannot draw: it lacks {}", self.info.missing_for_drawing.join(", "))))
     }
 
     /// How bytes reach buffers on the device.
@@ -195,6 +219,23 @@ impl Device {
         }
     }
 
+    /// How long a submission may last; none for as long as it needs.
+    pub(super) fn patience(&self) -> Option<Duration> {
+        self.patience
+    }
+
+    /// Whether a submission never ended.
+    pub(super) fn is_given_up(&self) -> bool {
+        self.is_given_up.load(Ordering::Relaxed)
+    }
+
+    /// Notes that a submission never ended. From here on nothing of the device is destroyed, and nothing is submitted.
+    pub(super) fn give_up(self: &Arc<Self>) {
+        self.is_given_up.store(true, Ordering::Relaxed);
+        // One owner more than there are, so that it is never dropped.
+        std::mem::forget(Arc::clone(self));
+    }
+
     /// Waits until the queue is idle. A lost device counts as idle.
     pub(super) fn wait_idle(&self) {
         let queue = self.queue();
@@ -243,14 +284,14 @@ fn create_raw(
     }
     let mut features = vk::PhysicalDeviceVulkan13Features::default()
         .synchronization2(true)
-        .dynamic_rendering(true)
         .maintenance4(true)
-        .shader_demote_to_helper_invocation(true);
+        .dynamic_rendering(info.can_draw())
+        .shader_demote_to_helper_invocation(info.can_draw());
     let create_info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .push_next(&mut features);
-    // SAFETY: V1; `DeviceInfo::missing` was empty, so the features are there.
+    // SAFETY: V1; `DeviceInfo::missing` was empty, so the features are there; those for drawing by `can_draw`.
     unsafe { instance.raw().create_device(physical, &create_info, None) }
         .map_err(|result| call_failed(format!("vkCreateDevice for {}", info.name), result))
 }

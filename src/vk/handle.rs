@@ -63,6 +63,9 @@ impl<T: Destroy> Owned<T> {
 
 impl<T: Destroy> Drop for Owned<T> {
     fn drop(&mut self) {
+        if self.device.is_given_up() {
+            return;
+        }
         // SAFETY: V1, V2.
         unsafe { self.handle.destroy(self.device.raw()) };
     }

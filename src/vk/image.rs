@@ -1,4 +1,4 @@
-//! Images: the targets that passes draw into, and layered textures that shaders fetch from.
+//! Images: the targets that passes draw into, and layered textures that shaders fetch from. All are for drawing.
 //!
 //! An image is moved to the layout `GENERAL` when it is created and stays there.
 
@@ -96,9 +96,10 @@ impl Image {
     ///
     /// # Errors
     /// [`Error::TooLarge`] if a side or the number of layers exceeds the device's limit, [`Error::OutOfDeviceMemory`]
-    /// if it does not fit.
+    /// if it does not fit, [`Error::Vulkan`] if the device cannot draw.
     pub fn create(device: &Arc<Device>, name: &str, format: ImageFormat, shape: ImageShape) -> Result<Arc<Self>> {
         check_shape(name, shape, device)?;
+        device.require_drawing(&format!("creation of image {name}"))?;
         let bytes = u64::from(shape.width_px) * u64::from(shape.height_px) * u64::from(shape.layers);
         let failed = |result| creation_failed(name, bytes * format.pixel_bytes(), result);
         let info = vk::ImageCreateInfo::default()

@@ -94,6 +94,9 @@ impl Memory {
 
 impl Drop for Memory {
     fn drop(&mut self) {
+        if self.device.is_given_up() {
+            return;
+        }
         let allocation = std::mem::take(&mut *lock(&self.allocation));
         // This fails only if the allocator does not know its own allocation. That would be a bug in it, and nobody
         // could handle it here.

@@ -15,6 +15,7 @@
 
 #![allow(unsafe_code, reason = "the only module that talks to Vulkan; its invariants are stated above")]
 
+mod abilities;
 mod buffer;
 mod choose;
 mod commands;
@@ -23,6 +24,7 @@ mod device;
 mod handle;
 mod image;
 mod instance;
+mod loader;
 mod memory;
 mod messages;
 mod observe;

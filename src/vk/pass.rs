@@ -10,8 +10,7 @@ use super::commands::record_barrier;
 use super::recorder::Recorder;
 use super::scope::Scope;
 use super::{
-    BindingGroup, Buffer, ComputePipeline, DepthTest, DeviceKind, GraphicsPipeline, Image, ImageFormat, PipelineLayout,
-    refused,
+    BindingGroup, Buffer, ComputePipeline, DepthTest, GraphicsPipeline, Image, ImageFormat, PipelineLayout, refused,
 };
 use crate::error::Result;
 
@@ -44,8 +43,10 @@ impl Recorder {
     /// Begins a pass that clears `targets` and draws into them. `name` is its label in debuggers, times and errors.
     ///
     /// # Errors
-    /// [`crate::Error::Vulkan`] if the targets are smaller than the area or not of the right formats.
+    /// [`crate::Error::Vulkan`] if the targets are smaller than the area or not of the right formats, or if the device
+    /// cannot draw.
     pub fn render_pass(&mut self, name: &'static str, targets: &RenderTargets<'_>) -> Result<RenderPass<'_>> {
+        self.device().require_drawing(&format!("recording of pass {name}"))?;
         targets.check(name)?;
         self.begin_pass(name, Scope::Graphics)?;
         for target in targets.colors {
@@ -194,19 +195,6 @@ impl ComputePass<'_> {
         }
         // SAFETY: V1, V2, V3, V4, V5.
         unsafe { self.recorder.device().raw().cmd_dispatch(self.recorder.commands(), x, y, z) };
-    }
-
-    /// Runs the `count` workgroups from `first` on of each of `z` rows of workgroups. Shaders see them with the numbers
-    /// that they have among all. Only on software Vulkan.
-    pub fn dispatch_part(&mut self, first: u32, count: u32, z: u32) {
-        let info = self.recorder.device().info();
-        let limits = info.limits.workgroups;
-        let fits = first.checked_add(count).is_some_and(|end| end <= limits[0]) && z <= limits[2];
-        if self.bound.is_none() || info.kind != DeviceKind::Cpu || !fits {
-            return self.recorder.fail_pass(format!("{z} rows of the workgroups {first} to {first} + {count}"));
-        }
-        // SAFETY: V1, V2, V3, V4, V5.
-        unsafe { self.recorder.device().raw().cmd_dispatch_base(self.recorder.commands(), first, 0, 0, count, 1, z) };
     }
 
     /// Makes everything that earlier dispatches wrote visible to the next ones.

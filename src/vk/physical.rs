@@ -5,6 +5,7 @@ use std::ffi::CStr;
 use ash::vk;
 use serde::Serialize;
 
+use super::abilities::{self, Lacking};
 use super::call_failed;
 use crate::error::Result;
 
@@ -29,6 +30,10 @@ pub enum DeviceKind {
 pub struct DeviceLimits {
     /// Largest storage buffer that a shader can access, in bytes.
     pub storage_buffer_bytes: u64,
+    /// Largest buffer, in bytes; unlimited below Vulkan 1.3.
+    pub buffer_bytes: u64,
+    /// Largest allocation of memory, in bytes; unlimited below Vulkan 1.3.
+    pub allocation_bytes: u64,
     /// Most storage buffers that one shader stage can access.
     pub storage_buffers_per_stage: u32,
     /// Most workgroups of one dispatch along x, y and z.
@@ -50,6 +55,12 @@ pub struct DeviceLimits {
 }
 
 impl DeviceLimits {
+    /// The largest storage buffer that can be made and seen whole, in bytes.
+    #[must_use]
+    pub fn largest_storage_buffer_bytes(&self) -> u64 {
+        self.storage_buffer_bytes.min(self.buffer_bytes).min(self.allocation_bytes)
+    }
+
     /// Nanoseconds from one timestamp to another; negative if the second one is older. Only the valid bits count.
     #[must_use]
     pub fn ns_between(&self, from_ticks: u64, to_ticks: u64) -> f64 {
@@ -89,18 +100,36 @@ pub struct DeviceInfo {
     pub memory_bytes: u64,
     /// Invocations of a subgroup; 0 below Vulkan 1.3.
     pub subgroup_size: u32,
-    /// Groups of subgroup operations that shaders may use.
+    /// Groups of subgroup operations that compute shaders may use.
     pub subgroup_operations: Vec<&'static str>,
     /// The limits that decide whether a job fits.
     pub limits: DeviceLimits,
     /// What the device lacks, in words; empty if it can be used.
     pub missing: Vec<String>,
+    /// What the device lacks to draw, in words; empty if it can draw, or not known below Vulkan 1.3. Without it the
+    /// device still computes.
+    pub missing_for_drawing: Vec<String>,
 }
 
-/// What every shader may rely on.
-const SUBGROUP_NEEDS: vk::SubgroupFeatureFlags = vk::SubgroupFeatureFlags::from_raw(
-    vk::SubgroupFeatureFlags::BASIC.as_raw() | vk::SubgroupFeatureFlags::ARITHMETIC.as_raw(),
-);
+impl DeviceInfo {
+    /// Whether the device can draw, if it can be used at all.
+    #[must_use]
+    pub fn can_draw(&self) -> bool {
+        self.missing_for_drawing.is_empty()
+    }
+
+    /// Whether it ends all loops of an invocation silently after 65,535 turns, as lavapipe does (Mesa 22.3.6).
+    #[must_use]
+    pub fn cuts_loops_short(&self) -> bool {
+        self.driver_name == "llvmpipe"
+    }
+
+    /// Whether compute shaders may add up over subgroups. Where they may not, others take their place.
+    #[must_use]
+    pub fn has_subgroup_arithmetic(&self) -> bool {
+        ["basic", "arithmetic"].iter().all(|needed| self.subgroup_operations.contains(needed))
+    }
+}
 
 const SUBGROUP_NAMES: [(vk::SubgroupFeatureFlags, &str); 8] = [
     (vk::SubgroupFeatureFlags::BASIC, "basic"),
@@ -154,7 +183,7 @@ pub(super) fn describe_for_list(instance: &ash::Instance, handle: vk::PhysicalDe
 fn identity(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) -> DeviceInfo {
     // SAFETY: V1.
     let properties = unsafe { instance.get_physical_device_properties(handle) };
-    let family = queue_family(instance, handle);
+    let family = abilities::queue_family(instance, handle);
     let version = properties.api_version;
     DeviceInfo {
         index,
@@ -176,8 +205,9 @@ fn identity(instance: &ash::Instance, handle: vk::PhysicalDevice, index: usize) 
         memory_bytes: local_memory_bytes(instance, handle),
         subgroup_size: 0,
         subgroup_operations: Vec::new(),
-        limits: limits_of(&properties.limits, family.map_or(0, |(_, timestamp_bits)| timestamp_bits)),
+        limits: limits_of(&properties.limits, family.map_or(0, |family| family.timestamp_bits)),
         missing: Vec::new(),
+        missing_for_drawing: Vec::new(),
     }
 }
 
@@ -189,12 +219,10 @@ fn add_details(instance: &ash::Instance, handle: vk::PhysicalDevice, info: &mut 
         return Ok(());
     }
     add_modern_properties(instance, handle, info)?;
-    add_missing_features(instance, handle, &mut info.missing);
-    add_missing_formats(instance, handle, &mut info.missing);
+    let Lacking { to_work, to_draw } = abilities::lacking(instance, handle);
+    info.missing.extend(to_work);
     info.missing.extend(missing_limits(&info.limits));
-    if queue_family(instance, handle).is_none() {
-        info.missing.push("a queue for graphics and compute".to_owned());
-    }
+    info.missing_for_drawing = to_draw;
     Ok(())
 }
 
@@ -205,16 +233,6 @@ fn missing_limits(limits: &DeviceLimits) -> impl Iterator<Item = String> {
         (offered < needed).then(|| format!("{needed} {name} (it has {offered})"))
     };
     NEEDED_LIMITS.into_iter().filter_map(too_low)
-}
-
-/// The first queue family for graphics and compute, and the number of valid bits of its timestamps.
-pub(super) fn queue_family(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Option<(u32, u32)> {
-    // SAFETY: V1.
-    let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };
-    (0..)
-        .zip(families)
-        .find(|(_, family)| family.queue_flags.contains(vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE))
-        .map(|(index, family)| (index, family.timestamp_valid_bits))
 }
 
 /// Whether the device offers the extension.
@@ -238,6 +256,8 @@ fn kind_of(device_type: vk::PhysicalDeviceType) -> DeviceKind {
 fn limits_of(limits: &vk::PhysicalDeviceLimits, timestamp_bits: u32) -> DeviceLimits {
     DeviceLimits {
         storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+        buffer_bytes: u64::MAX,
+        allocation_bytes: u64::MAX,
         storage_buffers_per_stage: limits.max_per_stage_descriptor_storage_buffers,
         workgroups: limits.max_compute_work_group_count,
         workgroup_invocations: limits.max_compute_work_group_invocations,
@@ -265,8 +285,12 @@ fn add_modern_properties(instance: &ash::Instance, handle: vk::PhysicalDevice, i
     let has_pci = has_extension(instance, handle, ash::ext::pci_bus_info::NAME)?;
     let mut vulkan11 = vk::PhysicalDeviceVulkan11Properties::default();
     let mut vulkan12 = vk::PhysicalDeviceVulkan12Properties::default();
+    let mut vulkan13 = vk::PhysicalDeviceVulkan13Properties::default();
     let mut pci = vk::PhysicalDevicePCIBusInfoPropertiesEXT::default();
-    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut vulkan11).push_next(&mut vulkan12);
+    let mut properties = vk::PhysicalDeviceProperties2::default()
+        .push_next(&mut vulkan11)
+        .push_next(&mut vulkan12)
+        .push_next(&mut vulkan13);
     if has_pci {
         properties = properties.push_next(&mut pci);
     }
@@ -278,52 +302,15 @@ fn add_modern_properties(instance: &ash::Instance, handle: vk::PhysicalDevice, i
     info.uuid = dashed(&vulkan11.device_uuid);
     info.pci = has_pci
         .then(|| format!("{:04x}:{:02x}:{:02x}.{:x}", pci.pci_domain, pci.pci_bus, pci.pci_device, pci.pci_function));
+    info.limits.buffer_bytes = vulkan13.max_buffer_size;
+    info.limits.allocation_bytes = vulkan11.max_memory_allocation_size;
     info.subgroup_size = vulkan11.subgroup_size;
-    let operations = vulkan11.subgroup_supported_operations;
+    let in_compute = vulkan11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE);
+    let operations =
+        if in_compute { vulkan11.subgroup_supported_operations } else { vk::SubgroupFeatureFlags::empty() };
     info.subgroup_operations =
         SUBGROUP_NAMES.iter().filter(|(flag, _)| operations.contains(*flag)).map(|&(_, name)| name).collect();
-    if !operations.contains(SUBGROUP_NEEDS)
-        || !vulkan11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE)
-    {
-        info.missing.push("subgroup arithmetic in compute shaders".to_owned());
-    }
     Ok(())
-}
-
-fn add_missing_features(instance: &ash::Instance, handle: vk::PhysicalDevice, missing: &mut Vec<String>) {
-    let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
-    // SAFETY: V1.
-    unsafe { instance.get_physical_device_features2(handle, &mut features) };
-    for (available, name) in [
-        (vulkan13.synchronization2, "synchronization2"),
-        (vulkan13.dynamic_rendering, "dynamicRendering"),
-        (vulkan13.maintenance4, "maintenance4"),
-        // What `discard` compiles to.
-        (vulkan13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
-    ] {
-        if available == vk::FALSE {
-            missing.push(format!("the feature {name}"));
-        }
-    }
-}
-
-fn add_missing_formats(instance: &ash::Instance, handle: vk::PhysicalDevice, missing: &mut Vec<String>) {
-    let color = vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::TRANSFER_SRC;
-    let depth = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
-    let sampled = vk::FormatFeatureFlags::SAMPLED_IMAGE | vk::FormatFeatureFlags::TRANSFER_DST;
-    for (format, needs, words) in [
-        (vk::Format::R8G8B8A8_UNORM, color, "R8G8B8A8_UNORM as a colour attachment"),
-        (vk::Format::R32_UINT, color, "R32_UINT as a colour attachment"),
-        (vk::Format::D32_SFLOAT, depth, "D32_SFLOAT as a depth attachment"),
-        (vk::Format::R8G8_UINT, sampled, "R8G8_UINT as a sampled image"),
-    ] {
-        // SAFETY: V1.
-        let properties = unsafe { instance.get_physical_device_format_properties(handle, format) };
-        if !properties.optimal_tiling_features.contains(needs) {
-            missing.push(words.to_owned());
-        }
-    }
 }
 
 fn text<E>(words: Result<&CStr, E>) -> String {

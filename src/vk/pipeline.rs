@@ -7,7 +7,7 @@ use ash::vk;
 use super::handle::Owned;
 use super::image::ImageFormat;
 use super::pipeline_layout::{BindingKind, PipelineLayout};
-use super::{Device, DeviceKind, refused};
+use super::{Device, refused};
 use crate::error::Result;
 
 /// First word of every SPIR-V module.
@@ -77,12 +77,7 @@ impl ComputePipeline {
         let constants = Specialization::new(shader.specialization);
         let specialization = constants.info();
         let stage = stage(vk::ShaderStageFlags::COMPUTE, module.get(), &specialization);
-        // Only software Vulkan is asked for parts of a dispatch.
-        let flags = match device.info().kind {
-            DeviceKind::Cpu => vk::PipelineCreateFlags::DISPATCH_BASE,
-            _ => vk::PipelineCreateFlags::empty(),
-        };
-        let infos = [vk::ComputePipelineCreateInfo::default().flags(flags).stage(stage).layout(layout.raw())];
+        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout.raw())];
         // SAFETY: V1, V4.
         let created = unsafe { device.raw().create_compute_pipelines(device.pipeline_cache(), &infos, None) };
         let handle = take_one(device, name, created)?;
@@ -112,9 +107,10 @@ impl GraphicsPipeline {
     /// Compiles the shaders for the device.
     ///
     /// # Errors
-    /// [`crate::Error::Vulkan`] if a module is not SPIR-V or the driver refuses it.
+    /// [`crate::Error::Vulkan`] if a module is not SPIR-V, the driver refuses it, or the device cannot draw.
     pub fn create(device: &Arc<Device>, shaders: &GraphicsShaders<'_>) -> Result<Arc<Self>> {
         let name = shaders.name;
+        device.require_drawing(&format!("creation of pipeline {name}"))?;
         let layout = PipelineLayout::create(device, name, shaders.bindings, shaders.push_constant_bytes)?;
         let vertex = create_module(device, name, shaders.vertex)?;
         let fragment = create_module(device, name, shaders.fragment)?;

@@ -6,10 +6,13 @@
 use std::any::Any;
 use std::ffi::CStr;
 use std::sync::Arc;
+use std::time::Duration;
 
 use ash::vk;
 
-use super::commands::{allocate_command_buffers, begin_commands, create_command_pool, end_commands, record_barrier};
+use super::commands::{
+    allocate_command_buffers, begin_commands, create_command_pool, create_fence, end_commands, record_barrier,
+};
 use super::handle::Owned;
 use super::scope::Scope;
 use super::timer::{READ_BACKS, Timer, UPLOADS};
@@ -39,6 +42,7 @@ pub struct Recorder {
     stop_query: Option<u32>,
     label: Vec<u8>,
     failure: Option<Error>,
+    took: Duration,
     name: String,
     observers: Vec<Arc<dyn SubmissionObserver>>,
     device: Arc<Device>,
@@ -55,9 +59,7 @@ impl Recorder {
         let [upload_commands, pass_commands] = allocate_command_buffers(&pool)?;
         device.set_name(upload_commands, &format!("{name} uploads"));
         device.set_name(pass_commands, &format!("{name} passes"));
-        // SAFETY: V1.
-        let fence = unsafe { device.raw().create_fence(&vk::FenceCreateInfo::default(), None) }
-            .map_err(|result| call_failed(format!("creation of the fence of {name}"), result))?;
+        let fence = create_fence(device, name)?;
         let observers = lock(&device.observers).clone();
         let asks = |observer: &Arc<dyn SubmissionObserver>| observer.timing() == Timing::On;
         let timing = if observers.iter().any(asks) { Timing::On } else { timing };
@@ -69,15 +71,16 @@ impl Recorder {
             upload_commands,
             pass_commands,
             pool,
-            fence: Owned::new(device, fence, name),
+            fence,
             is_recording: false,
             recording: device.next_recording(),
             last_scope: Scope::Earlier,
-            last_pass: "none",
+            last_pass: "transfers",
             is_pass_open: false,
             stop_query: None,
             label: Vec::new(),
             failure: None,
+            took: Duration::ZERO,
             name: name.to_owned(),
             observers,
             device: Arc::clone(device),
@@ -186,6 +189,16 @@ impl Recorder {
         self.timer.as_ref().map_or(&[], Timer::times)
     }
 
+    /// How long the last submission took, from handing it over until it was over.
+    #[must_use]
+    pub fn took(&self) -> Duration {
+        self.took
+    }
+
+    pub(super) fn note_time(&mut self, took: Duration) {
+        self.took = took;
+    }
+
     /// Starts a recording unless one is in progress.
     pub(super) fn begin(&mut self) -> Result<()> {
         if self.is_recording {
@@ -198,7 +211,7 @@ impl Recorder {
         self.is_recording = true;
         self.recording = self.device.next_recording();
         self.last_scope = Scope::Earlier;
-        self.last_pass = "none";
+        self.last_pass = "transfers";
         if let Some(timer) = &mut self.timer {
             timer.record_reset(self.pass_commands);
         }

@@ -1,11 +1,10 @@
 //! Handing recorded commands to the queue and waiting for them.
 
 use std::sync::Arc;
-
-use ash::vk;
+use std::time::Instant;
 
 use super::Submission;
-use super::commands::submission_failed;
+use super::commands::run_and_wait;
 use super::recorder::Recorder;
 use crate::error::Result;
 
@@ -42,28 +41,12 @@ impl Recorder {
 
     fn run(&mut self) -> Result<()> {
         let device = Arc::clone(self.device());
-        let fence = [self.fence()];
         let (uploads, passes) = self.command_buffers();
-        let infos = [uploads, passes].map(|commands| vk::CommandBufferSubmitInfo::default().command_buffer(commands));
-        let infos = if self.has_uploads() { &infos[..] } else { &infos[1..] };
-        let submits = [vk::SubmitInfo2::default().command_buffer_infos(infos)];
-        let failed = |call: &str, result| submission_failed(call, result, self.last_pass());
-        {
-            let queue = device.queue();
-            // SAFETY: V1, V2, V3: the fence is not in use, since every submission is waited for.
-            unsafe {
-                device.raw().reset_fences(&fence).map_err(|result| failed("vkResetFences", result))?;
-                device
-                    .raw()
-                    .queue_submit2(*queue, &submits, fence[0])
-                    .map_err(|result| failed("vkQueueSubmit2", result))?;
-            }
-        }
-        // SAFETY: V1.
-        unsafe { device.raw().wait_for_fences(&fence, true, u64::MAX) }.map_err(|result| {
-            // V2: the objects that the commands use are dropped next.
-            device.wait_idle();
-            failed("vkWaitForFences", result)
-        })
+        let commands = [uploads, passes];
+        let commands = if self.has_uploads() { &commands[..] } else { &commands[1..] };
+        let began = Instant::now();
+        let outcome = run_and_wait(&device, commands, self.fence(), self.last_pass());
+        self.note_time(began.elapsed());
+        outcome
     }
 }

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use smalti::vk::{
-    Choice, Device, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Staging, Validation, choose,
+    Choice, Device, DeviceInfo, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Staging, Validation, choose,
 };
 
 /// Runs `test` on a fresh device, drops everything, and returns what the validation layer said.
@@ -15,6 +15,18 @@ use smalti::vk::{
 /// # Panics
 /// With the packages to install, if there is no software Vulkan or no validation layer.
 pub fn watch<T>(options: &DeviceOptions, test: impl FnOnce(Arc<Device>) -> T) -> (T, Vec<String>) {
+    watch_changed(options, |_| {}, test)
+}
+
+/// As [`watch`], on a device that is opened as if it were as `change` says.
+///
+/// # Panics
+/// As [`watch`].
+pub fn watch_changed<T>(
+    options: &DeviceOptions,
+    change: impl FnOnce(&mut DeviceInfo),
+    test: impl FnOnce(Arc<Device>) -> T,
+) -> (T, Vec<String>) {
     let instance = Instance::create(InstanceOptions { validation: Validation::On }).unwrap_or_else(|error| {
         panic!("tests need libvulkan1, mesa-vulkan-drivers and vulkan-validationlayers: {error}")
     });
@@ -27,7 +39,9 @@ pub fn watch<T>(options: &DeviceOptions, test: impl FnOnce(Arc<Device>) -> T) ->
     let Choice::Vulkan(index) = choice else { panic!("a device asked for by name is a Vulkan device") };
     let staging = if is_staging_forced() { Staging::Forced } else { options.staging };
     let options = DeviceOptions { staging, ..options.clone() };
-    let device = Device::create(&instance, &devices[index], &options).expect("software Vulkan can be opened");
+    let mut info = devices[index].clone();
+    change(&mut info);
+    let device = Device::create(&instance, &info, &options).expect("software Vulkan can be opened");
     assert_eq!(device.staging(), staging);
     let alive = Arc::downgrade(&device);
 

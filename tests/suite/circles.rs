@@ -12,7 +12,7 @@ const FLOORS_OF_CLI: [&[&str]; 8] = [
     &["files"],
     &["trace"],
     &["args"],
-    &["jobs"],
+    &["checks", "jobs"],
     &["list", "film", "mosaics"],
     &["commands", "config", "help", "hints"],
 ];

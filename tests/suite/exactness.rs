@@ -20,7 +20,7 @@ use crate::scenarios::{
 /// Flies whose marginal fitness is also checked by leaving them out of a whole picture.
 const RE_RENDERS: usize = 500;
 
-fn check_scenario(evaluator: &mut dyn Evaluator, painter: &mut dyn Painter, scenario: &Scenario) {
+pub fn check_scenario(evaluator: &mut dyn Evaluator, painter: &mut dyn Painter, scenario: &Scenario) {
     let Scenario { name, scene, flies } = scenario;
     evaluator.load(&[(0, flies)]).expect("the evaluator works");
     let reference = Reference::new(scene, flies);

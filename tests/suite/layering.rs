@@ -34,7 +34,11 @@ const RESERVED: [(&[&str], &[&str], &str); 5] = [
         &["threads"],
         "only `threads` starts threads, since it minds that the system may refuse",
     ),
-    (&["Instant", "SystemTime"], &["cli", "main"], "only `cli` reads the clock; take a duration or a stop reason"),
+    (
+        &["Instant", "SystemTime"],
+        &["cli", "main", "vk"],
+        "only `cli` reads the clock, and `vk` to time a submission; take a duration or a stop reason",
+    ),
 ];
 
 /// Longer than this and a file is two files.

@@ -135,13 +135,13 @@ fn twins() -> Vec<Twin> {
             round = "round", wanted = "wanted", pending = "pending", is_fresh = "is_fresh", overrun = "overrun",
             evals_low = "evals_low", evals_high = "evals_high", births_low = "births_low",
             births_high = "births_high", accepted_low = "accepted_low", accepted_high = "accepted_high",
-            change_low = "change_low", change_high = "change_high", iterations = "iterations"
+            change_low = "change_low", change_high = "change_high", iterations = "iterations", under_way = "under_way"
         }),
         twin!(CellRecord = "CellRecord" in Array of CELLS, {
             first = "first", count = "count", step = "step", dealt = "dealt", filled = "filled"
         }),
         twin!(CellsPush = "Push" in PushConstants of CELLS, {
-            first_lane = "first_lane", budget = "budget"
+            first_lane = "first_lane", budget = "budget", first_cell = "first_cell"
         }),
         twin!(EvaluatePush = "Push" in PushConstants of ["evaluate.comp"], {
             item_count = "item_count"

@@ -17,6 +17,7 @@ mod cli_cells;
 mod cli_interrupts;
 mod cli_refusals;
 mod cli_scheme;
+mod compute_only;
 mod determinism;
 mod exactness;
 mod files;
@@ -54,6 +55,7 @@ mod score;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
 mod shaders_fresh;
+mod shaped_devices;
 mod shapes;
 mod shards;
 mod show;

@@ -8,6 +8,7 @@ use smalti::vk::NEEDED_LIMITS;
 
 // Operations, decorations and the rest by the numbers of the SPIR-V specification, section 3.
 const OP_EXECUTION_MODE: u32 = 16;
+const OP_CAPABILITY: u32 = 17;
 const OP_VARIABLE: u32 = 59;
 const OP_DECORATE: u32 = 71;
 const SPEC_ID: u32 = 1;
@@ -15,6 +16,10 @@ const BUILT_IN: u32 = 11;
 const WORKGROUP_SIZE: u32 = 25;
 const LOCAL_SIZE: u32 = 17;
 const STORAGE_BUFFER: u32 = 12;
+const SHADER: u32 = 1;
+const GROUP_NON_UNIFORM: u32 = 61;
+const GROUP_NON_UNIFORM_ARITHMETIC: u32 = 63;
+const DEMOTE_TO_HELPER_INVOCATION: u32 = 5379;
 const WORDS_OF_HEADER: usize = 5;
 
 /// Every module with its name, as operations.
@@ -75,4 +80,19 @@ fn a_device_must_have_what_the_modules_use_and_no_more() {
     let needed = NEEDED_LIMITS.map(|limit| (limit.name, limit.needed as usize));
     assert_eq!(needed[1], ("invocations in a workgroup", most(&invocations)));
     assert_eq!(needed[0], ("storage buffers per shader stage", most(&storage_buffers)));
+}
+
+#[test]
+fn no_module_uses_a_capability_that_the_table_in_architecture_does_not_name() {
+    for (name, operations) in modules() {
+        for operation in &operations {
+            let [OP_CAPABILITY, capability] = operation[..] else { continue };
+            let is_known = match capability {
+                SHADER | GROUP_NON_UNIFORM | GROUP_NON_UNIFORM_ARITHMETIC => true,
+                DEMOTE_TO_HELPER_INVOCATION => name == "mosaic.frag.spv",
+                _ => false,
+            };
+            assert!(is_known, "{name} uses capability {capability}; see ARCHITECTURE.md, \"What a device must offer\"");
+        }
+    }
 }

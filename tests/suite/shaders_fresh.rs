@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 
 use smalti::gpu::cells::layout::search_rules_glsl;
 
-use crate::shader_manifest::{Manifest, OPTIONS, STAGES, compiler_version, flattened_source, sha256};
+use crate::shader_manifest::{
+    Manifest, OPTIONS, PLAIN_MACRO, PLAIN_STAGES, STAGES, all_modules, compiler_version, flattened_source, module_file,
+    sha256,
+};
 
 const RECOMPILE: &str = "run `cargo run --release --features shader-compiler --bin compile-shaders` and commit spirv/";
 
@@ -37,17 +40,27 @@ fn files_in(folder: &str) -> BTreeSet<String> {
 fn every_module_is_the_one_compiled_from_its_source_and_includes() {
     for module in manifest().modules {
         let stage = &module.stage;
+        let file = module_file(stage, module.is_plain);
         let source = flattened_source(&project("glsl"), stage);
         assert_eq!(
             sha256(source.as_bytes()),
             module.source_sha256,
-            "glsl/{stage} or a file that it includes changed after spirv/{stage}.spv was compiled; {RECOMPILE}"
+            "glsl/{stage} or a file that it includes changed after spirv/{file} was compiled; {RECOMPILE}"
         );
         assert_eq!(
-            sha256(&read(&format!("spirv/{stage}.spv"))),
+            sha256(&read(&format!("spirv/{file}"))),
             module.module_sha256,
-            "spirv/{stage}.spv is not the module of spirv/MANIFEST; {RECOMPILE}"
+            "spirv/{file} is not the module of spirv/MANIFEST; {RECOMPILE}"
         );
+    }
+}
+
+#[test]
+fn exactly_the_stages_that_add_up_over_subgroups_are_compiled_without_them_too() {
+    let divided = format!("#ifdef {PLAIN_MACRO}");
+    for stage in STAGES {
+        let is_divided = flattened_source(&project("glsl"), stage).contains(&divided);
+        assert_eq!(is_divided, PLAIN_STAGES.contains(&stage), "glsl/{stage}");
     }
 }
 
@@ -67,12 +80,15 @@ fn the_modules_were_compiled_with_the_options_and_the_compiler_of_this_commit() 
 
 #[test]
 fn sources_and_modules_are_exactly_those_of_the_manifest() {
-    let compiled: Vec<String> = manifest().modules.into_iter().map(|module| module.stage).collect();
-    assert_eq!(compiled, STAGES, "spirv/MANIFEST does not list STAGES of tools/shader_manifest.rs; {RECOMPILE}");
-    let sources: BTreeSet<String> = compiled.iter().cloned().collect();
+    let compiled: Vec<(String, bool)> =
+        manifest().modules.into_iter().map(|module| (module.stage, module.is_plain)).collect();
+    let listed: Vec<(String, bool)> = all_modules().map(|(stage, is_plain)| (stage.to_owned(), is_plain)).collect();
+    assert_eq!(compiled, listed, "spirv/MANIFEST does not list the modules of tools/shader_manifest.rs; {RECOMPILE}");
+    let sources: BTreeSet<String> = compiled.iter().map(|(stage, _)| stage.clone()).collect();
     assert_eq!(files_in("glsl"), sources, "a file in glsl/ is a stage and stands in STAGES; what is shared is below");
-    let modules = compiled.iter().map(|stage| format!("{stage}.spv")).chain(["MANIFEST".to_owned()]).collect();
-    assert_eq!(files_in("spirv"), modules, "spirv/ holds one module per stage and nothing else; {RECOMPILE}");
+    let modules = compiled.iter().map(|(stage, is_plain)| module_file(stage, *is_plain));
+    let files: BTreeSet<String> = modules.chain(["MANIFEST".to_owned()]).collect();
+    assert_eq!(files_in("spirv"), files, "spirv/ holds the modules of the manifest and nothing else; {RECOMPILE}");
 }
 
 #[test]

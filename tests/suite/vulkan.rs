@@ -220,7 +220,7 @@ struct Square {
     layer: u32,
 }
 
-fn squares(device: &Arc<Device>) -> Result<Arc<GraphicsPipeline>> {
+pub fn squares(device: &Arc<Device>) -> Result<Arc<GraphicsPipeline>> {
     GraphicsPipeline::create(
         device,
         &GraphicsShaders {
@@ -332,6 +332,8 @@ fn software_vulkan_is_described_as_a_device_that_lacks_nothing() {
         let info = device.info();
         assert_eq!(info.kind, DeviceKind::Cpu);
         assert_eq!(info.missing, Vec::<String>::new());
+        assert_eq!(info.missing_for_drawing, Vec::<String>::new());
+        assert!(info.can_draw());
         assert!(info.api_version.starts_with("1."), "{}", info.api_version);
         assert!(info.subgroup_size.is_power_of_two(), "{}", info.subgroup_size);
         assert!(info.subgroup_operations.contains(&"arithmetic"), "{:?}", info.subgroup_operations);

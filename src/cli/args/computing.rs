@@ -1,12 +1,15 @@
 //! What computes: the flags of all commands that evolve or draw, and the devices and threads they ask for.
 
-use clap::Args;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
 
 use crate::cli::files::pipelines;
 use crate::cli::terminal::{self, Verbosity};
 use crate::cli::values;
 use crate::error::{Error, NoDevice, Result};
-use crate::studio::{self, Device};
+use crate::studio::{self, Device, Opening};
 use crate::threads;
 use crate::vk::{DeviceRequest, Validation};
 
@@ -26,6 +29,23 @@ pub(crate) struct ComputingArgs {
     /// CPU threads, 1 to 1,024; the result does not depend on them [default: all]
     #[arg(long, value_name = "T", env = "SMALTI_THREADS", hide_env_values = true, value_parser = thread_choice)]
     pub threads: Option<ThreadChoice>,
+    /// If a graphics card is lost in the middle of the work: stop (exit code 75; the same command goes on later), or
+    /// let the cpu make the rest, which comes to the same bytes
+    #[arg(long, value_enum, value_name = "WHAT", default_value = "stop", hide_short_help = true)]
+    pub on_device_lost: OnDeviceLost,
+    /// How long a graphics card may take for a piece of work that is meant to last tenths of a second, before it counts
+    /// as lost: such as 30s [default: 120s]
+    #[arg(long, value_name = "TIME", value_parser = values::duration, hide_short_help = true)]
+    pub device_timeout: Option<Duration>,
+}
+
+/// What is done when a device is lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OnDeviceLost {
+    /// The work ends with exit code 75.
+    Stop,
+    /// The CPU makes the rest.
+    Cpu,
 }
 
 /// How many threads were asked for. An empty SMALTI_THREADS asks for none.
@@ -46,21 +66,23 @@ pub(crate) struct DevicesArg {
 }
 
 impl DevicesArg {
-    /// Opens the devices of the list or, without a list, the one of `--device` or SMALTI_DEVICE.
+    /// Opens the devices of the list or, without a list, the one of `--device` or SMALTI_DEVICE. The loss of one is an
+    /// error, since another one may take its pictures.
     ///
     /// # Errors
     /// [`Error::NoSuitableDevice`] if one of them does not exist, or if `all` finds none; [`Error::Usage`] if the list
     /// is empty.
     pub(crate) fn select(&self, computing: &Computing) -> Result<Vec<Device>> {
-        let Some(list) = &self.devices else { return Ok(vec![computing.select()?]) };
+        let Some(list) = &self.devices else { return Ok(vec![computing.select_itself()?]) };
         if list.trim() == "all" {
-            return studio::select_all(computing.validation, Some(&pipelines::keeper()));
+            return studio::select_all(&computing.opening(OnDeviceLost::Stop));
         }
         let names: Vec<&str> = list.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
         if names.is_empty() {
             return Err(Error::Usage("--devices: expected all, or devices with commas, such as 0,1".to_owned()));
         }
-        names.into_iter().map(|name| select(&request(name)?, computing.validation)).collect()
+        let opening = computing.opening(OnDeviceLost::Stop);
+        names.into_iter().map(|name| studio::select(&request(name)?, &opening)).collect()
     }
 }
 
@@ -69,6 +91,8 @@ impl DevicesArg {
 pub(crate) struct Computing {
     pub request: DeviceRequest,
     pub validation: Validation,
+    pub on_device_lost: OnDeviceLost,
+    device_timeout: Option<Duration>,
     threads: Option<usize>,
 }
 
@@ -85,7 +109,12 @@ impl ComputingArgs {
         }
         let in_range = |count| values::in_range("--threads", count, 1..=THREADS_MAX).map(|count| count as usize);
         let asked_for = self.threads.and_then(|ThreadChoice(count)| count);
-        Ok(Computing { request, validation, threads: asked_for.map(in_range).transpose()? })
+        if self.device_timeout.is_some_and(|timeout| timeout.is_zero()) {
+            return Err(Error::Usage("--device-timeout 0: must be above 0, such as 30s".to_owned()));
+        }
+        let threads = asked_for.map(in_range).transpose()?;
+        let Self { on_device_lost, device_timeout, .. } = *self;
+        Ok(Computing { request, validation, on_device_lost, device_timeout, threads })
     }
 
     /// Gives the CPU twin its threads, opens the device, and says so if the CPU computes unasked. For commands that
@@ -120,21 +149,37 @@ impl Computing {
         self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
     }
 
-    /// Finds and opens the device.
+    /// Finds and opens the device, with the pipelines that an earlier run cached for it. If it is lost, what was asked
+    /// for is done.
     ///
     /// # Errors
     /// As [`studio::select`].
     pub(crate) fn select(&self) -> Result<Device> {
-        select(&self.request, self.validation)
+        studio::select(&self.request, &self.opening(self.on_device_lost))
     }
-}
 
-/// Opens a device, with the pipelines that an earlier run cached for it.
-///
-/// # Errors
-/// As [`studio::select`].
-pub(crate) fn select(request: &DeviceRequest, validation: Validation) -> Result<Device> {
-    studio::select(request, validation, Some(&pipelines::keeper()))
+    /// As [`Computing::select`], but the loss of the device is an error, whatever was asked for.
+    ///
+    /// # Errors
+    /// As [`studio::select`].
+    pub(crate) fn select_itself(&self) -> Result<Device> {
+        studio::select(&self.request, &self.opening(OnDeviceLost::Stop))
+    }
+
+    /// The same for another device.
+    pub(crate) fn of(&self, request: DeviceRequest) -> Self {
+        Self { request, ..self.clone() }
+    }
+
+    fn opening(&self, on_device_lost: OnDeviceLost) -> Opening {
+        let tell = |error: &Error| terminal::error(&format!("{error}; the CPU makes the rest"));
+        Opening {
+            validation: self.validation,
+            keeper: Some(pipelines::keeper()),
+            patience: self.device_timeout,
+            on_lost: if on_device_lost == OnDeviceLost::Cpu { Some(Arc::new(tell)) } else { None },
+        }
+    }
 }
 
 /// Says that the CPU computes, unless the user asked for it.

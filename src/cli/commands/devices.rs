@@ -58,10 +58,19 @@ fn block(device: &DeviceInfo) -> String {
         ("memory", BinaryBytes(device.memory_bytes).to_string()),
         ("subgroup", format!("{} invocations; {}", device.subgroup_size, device.subgroup_operations.join(", "))),
         ("limits", limits_line(limits)),
-        ("lacks", if device.missing.is_empty() { "nothing".to_owned() } else { device.missing.join(", ") }),
+        ("lacks", lacks_line(&device.missing, &device.missing_for_drawing)),
     ];
     let rows: String = rows.iter().map(|(title, text)| format!("   {title:<9} {text}\n")).collect();
     format!("{index}  {name}\n{rows}")
+}
+
+/// What a device lacks, and what follows if that is only for drawing.
+fn lacks_line(missing: &[String], missing_for_drawing: &[String]) -> String {
+    match (missing, missing_for_drawing) {
+        ([], []) => "nothing".to_owned(),
+        ([], lacking) => format!("{}; it searches, and the CPU draws opaque tiles", lacking.join(", ")),
+        (lacking, _) => lacking.join(", "),
+    }
 }
 
 fn limits_line(limits: &DeviceLimits) -> String {
@@ -83,5 +92,22 @@ fn kind_name(kind: DeviceKind) -> &'static str {
         DeviceKind::Virtual => "virtual GPU",
         DeviceKind::Cpu => "software on the CPU",
         DeviceKind::Other => "other",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_that_only_cannot_draw_is_told_apart_from_one_that_is_of_no_use() {
+        let words = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>();
+        let line = |missing: &[&str], for_drawing: &[&str]| lacks_line(&words(missing), &words(for_drawing));
+        assert_eq!(line(&[], &[]), "nothing");
+        assert_eq!(
+            line(&[], &["a queue for graphics", "R32_UINT as a colour attachment"]),
+            "a queue for graphics, R32_UINT as a colour attachment; it searches, and the CPU draws opaque tiles"
+        );
+        assert_eq!(line(&["Vulkan 1.3", "a queue for compute"], &["x"]), "Vulkan 1.3, a queue for compute");
     }
 }

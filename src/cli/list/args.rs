@@ -119,6 +119,9 @@ pub(crate) struct BatchArgs {
     /// Check every Vulkan call with the validation layer; any message is an error
     #[arg(long, help_heading = "Computing")]
     pub validate: bool,
+    /// First check that each device gives what the CPU gives, as smalti check does; end if one does not
+    #[arg(long, help_heading = "Computing")]
+    pub check: bool,
 
     /// Write what threads and devices did at what time, to be seen in ui.perfetto.dev; the result stays the same
     #[arg(long, value_name = "FILE", help_heading = "Seeing inside")]

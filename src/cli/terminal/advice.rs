@@ -22,7 +22,9 @@ pub(crate) fn sentence(error: &Error) -> String {
         }
         Error::TooLarge { remedies, .. } if !remedies.is_empty() => format!("{error}; {}", use_these(remedies)),
         Error::OutOfDeviceMemory { .. } | Error::OutOfMemory { .. } => format!("{error}; {}", use_these(&LESS_MEMORY)),
-        Error::DeviceLost { .. } => format!("{error}; run the same command again, or use --device cpu"),
+        Error::DeviceLost { .. } => {
+            format!("{error}; run the same command again, or let the CPU make the rest by --on-device-lost cpu")
+        }
         Error::Interrupted => format!("{error}; run the same command again"),
         Error::Input { reason, .. } if reason == IS_A_PICTURE => {
             format!("{error}, which smalti evolve writes with -o tiles.npz")

@@ -3,8 +3,8 @@
 use super::buffers::LaneSlices;
 use super::layout::SearchHeader;
 use super::mark::Mark;
-use super::pass::Variant;
 use super::plan::Plan;
+use super::shape::CellShape;
 use crate::error::Error;
 use crate::model::cells::{Course, Standing};
 
@@ -12,7 +12,9 @@ use crate::model::cells::{Course, Standing};
 pub(super) struct Lane {
     pub course: Course,
     pub plan: Plan,
-    pub variant: Variant,
+    pub shape: CellShape,
+    /// Number of the kin in whose buffers it lies.
+    pub kin: u64,
     pub slices: LaneSlices,
     pub standing: Standing,
     /// The objective of the population that was loaded.
@@ -33,11 +35,12 @@ pub(super) struct Lane {
 
 impl Lane {
     /// A lane that nothing was loaded into yet.
-    pub fn new(course: Course, plan: Plan, variant: Variant, slices: LaneSlices) -> Self {
+    pub fn new(course: Course, plan: Plan, shape: CellShape, (kin, slices): (u64, LaneSlices)) -> Self {
         Self {
             course,
             plan,
-            variant,
+            shape,
+            kin,
             slices,
             standing: Standing::default(),
             objective: 0,
@@ -62,7 +65,7 @@ impl Lane {
             self.failure = Some(Error::Internal(format!(
                 "a step of cell {} needs more than the {} turns of loops that a dispatch of the cells pass may take",
                 header.overrun - 1,
-                self.variant.shape.budget
+                self.shape.budget
             )));
             return;
         }

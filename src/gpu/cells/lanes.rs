@@ -8,49 +8,61 @@ use rayon::prelude::*;
 
 use super::buffers::{self, LaneSlices, POOLS, Part, SearchBuffers};
 use super::lane::Lane;
-use super::layout::{CellRecord, FlyRecord, SearchHeader};
-use super::pass::{CellsPass, LaneSize, OldDepths, Team, Variant};
+use super::layout::{FlyRecord, SearchHeader};
+use super::pass::{CellsPart, CellsPass, LaneSize, OldDepths, Team, Variant};
 use super::plan::{PIXEL_WORDS, Plan};
 use super::shape::CellShape;
 use super::state;
-use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
+use crate::gpu::pace::Pace;
 use crate::gpu::pools::{BufferRange, Growth, Needs};
 use crate::model::Fly;
-use crate::model::cells::rules::STEP_FIRST;
 use crate::model::cells::{Course, Search, SearchLanes, SearchState, Stacks, Standing, depths};
 use crate::vk::{Device, DeviceKind, PassTime, ReadTicket, Recorder, Timing};
 
-/// Most iterations of a submission, which keep it well below a watchdog's second. Software Vulkan has no watchdog, but
-/// runs the lanes of a dispatch one after the other; there all lanes share this number.
+/// Most iterations of a submission to software Vulkan, which runs the lanes of a dispatch one after the other: all
+/// lanes share this number.
 const ITERATIONS_MAX: u32 = 16;
+/// Most iterations of a submission to hardware. More would not make it busier.
+const ITERATIONS_MAX_WIDE: u32 = 128;
 /// Most cells that a submission to software Vulkan takes as far as their budget allows: tenths of a second of work.
 /// An iteration of more of them takes several submissions.
 const CELLS_MAX: u32 = 64;
+/// The cells of the first submission to hardware of unknown speed.
+const CELLS_FIRST: u64 = 256;
 /// Evals that software Vulkan may lose when it is cut short: a tenth of a second of work.
 const EVALS_BETWEEN_MARKS: u64 = 20_000;
 
 /// Searches on a Vulkan device that share its dispatches. Their sizes, numbers of flies and rules may differ.
 ///
-/// Memory bounds the number of lanes: no buffer that they share may be larger than shaders can see, and several lanes
-/// together may take half of the device's memory.
+/// Memory bounds the number of lanes: several of them together may take half of the device's memory. No buffer may be
+/// larger than shaders can see, so many lanes share several sets of buffers.
 pub struct VulkanLanes {
     pub(super) device: Arc<Device>,
     pub(super) recorder: Recorder,
     pass: CellsPass,
     kins: Vec<Kin>,
+    /// Kins so far, those that are gone included.
+    kin_count: u64,
     /// By number, without those that are free.
     pub(super) lanes: Vec<Option<Lane>>,
     /// Whether the rules on the device and the stages of the pass are those of the lanes.
     is_arranged: bool,
-    /// Of an iteration that takes several submissions, the first cell of the next one; 0 between iterations.
-    next_cell: u32,
+    /// Of an iteration that takes several submissions, where the next one begins: cell and lane; zeros between
+    /// iterations.
+    next: (u32, u32),
+    /// In cells that are taken as far as their budget allows.
+    pace: Pace,
+    /// Cells of the submission at hand.
+    recorded: u64,
 }
 
-/// The lanes of one variant. They share buffers that no other lanes use, so that dispatches of different kins need no
-/// barrier between them.
+/// Lanes of one variant, all or as many as buffers can hold. They share buffers that no other lanes use, so that
+/// dispatches of different kins need no barrier between them.
 struct Kin {
     variant: Variant,
+    /// No other kin has had it.
+    number: u64,
     buffers: SearchBuffers,
     /// The lanes in the order of their rules on the device.
     order: Vec<usize>,
@@ -68,9 +80,12 @@ impl VulkanLanes {
             recorder: Recorder::create(device, "cells search", timing)?,
             pass: CellsPass::create(device)?,
             kins: Vec::new(),
+            kin_count: 0,
             lanes: Vec::new(),
             is_arranged: false,
-            next_cell: 0,
+            next: (0, 0),
+            pace: Pace::for_kind(device.info().kind, CELLS_FIRST),
+            recorded: 0,
         })
     }
 
@@ -89,12 +104,12 @@ impl VulkanLanes {
         let plan = Plan::new(&course);
         let variant = Variant::new(&course, shape);
         let needs = buffers::needs(&course, &plan, shape);
-        let Some(slices) = self.take_slices(variant, &needs)? else { return Ok(None) };
+        let Some((kin, slices)) = self.take_slices(variant, &needs)? else { return Ok(None) };
         let number = self.lanes.iter().position(Option::is_none).unwrap_or(self.lanes.len());
         if number == self.lanes.len() {
             self.lanes.push(None);
         }
-        self.lanes[number] = Some(Lane::new(course, plan, variant, slices));
+        self.lanes[number] = Some(Lane::new(course, plan, shape, (kin, slices)));
         if let Err(error) = self.begin(number, first) {
             self.dismiss(number);
             return Err(error);
@@ -102,39 +117,46 @@ impl VulkanLanes {
         Ok(Some(number))
     }
 
-    /// Finds room for a lane among those of its variant.
-    fn take_slices(&mut self, variant: Variant, needs: &Needs<'_, POOLS>) -> Result<Option<LaneSlices>> {
+    /// Finds room for a lane among those of its variant, or in buffers of its own. Returns the number of its kin, too.
+    fn take_slices(&mut self, variant: Variant, needs: &Needs<'_, POOLS>) -> Result<Option<(u64, LaneSlices)>> {
         self.pass.disband();
         self.is_arranged = false;
-        let place = match self.kins.iter().position(|kin| kin.variant == variant) {
-            Some(place) => place,
-            None => {
-                let buffers = SearchBuffers::create(&self.device, &mut self.recorder)?;
-                self.kins.push(Kin { variant, buffers, order: Vec::new() });
-                self.kins.len() - 1
+        for place in 0..self.kins.len() {
+            if self.kins[place].variant == variant
+                && let Some(slices) = self.admit_to(place, needs)?
+            {
+                return Ok(Some((self.kins[place].number, slices)));
             }
-        };
-        let others = self.kins.iter().filter(|kin| kin.variant != variant).map(|kin| kin.buffers.bytes());
-        // A lane alone may take what the device has; more of them share half of it.
-        let bytes_max = (self.device.info().memory_bytes / 2).saturating_sub(others.sum());
-        let is_alone = self.lanes.iter().all(Option::is_none);
-        let growth = if is_alone { Growth::Alone } else { Growth::Shared { bytes_max } };
-        let taken = self.kins[place].buffers.admit(&mut self.recorder, needs, growth);
-        if self.kins[place].buffers.is_empty() {
-            self.kins.remove(place);
         }
-        taken
+        let buffers = SearchBuffers::create(&self.device, &mut self.recorder)?;
+        let number = self.kin_count;
+        self.kin_count += 1;
+        self.kins.push(Kin { variant, number, buffers, order: Vec::new() });
+        let taken = self.admit_to(self.kins.len() - 1, needs);
+        self.kins.retain(|kin| !kin.buffers.is_empty());
+        Ok(taken?.map(|slices| (number, slices)))
     }
 
-    fn kin(&self, variant: Variant) -> &Kin {
-        let kin = self.kins.iter().find(|kin| kin.variant == variant);
-        kin.unwrap_or_else(|| panic!("lanes of {variant:?} have no buffers"))
+    /// Finds room for a lane in the buffers of a kin.
+    fn admit_to(&mut self, place: usize, needs: &Needs<'_, POOLS>) -> Result<Option<LaneSlices>> {
+        let others = self.kins.iter().enumerate().filter(|(other, _)| *other != place);
+        // A lane alone may take what the device has; more of them share half of it.
+        let bytes: u64 = others.map(|(_, kin)| kin.buffers.bytes()).sum();
+        let bytes_max = (self.device.info().memory_bytes / 2).saturating_sub(bytes);
+        let is_alone = self.lanes.iter().all(Option::is_none);
+        let growth = if is_alone { Growth::Alone } else { Growth::Shared { bytes_max } };
+        self.kins[place].buffers.admit(&mut self.recorder, needs, growth)
+    }
+
+    fn kin(&self, number: u64) -> &Kin {
+        let kin = self.kins.iter().find(|kin| kin.number == number);
+        kin.unwrap_or_else(|| panic!("kin {number} has no buffers"))
     }
 
     /// Where a lane's slice lies in the buffer of a part.
     pub(super) fn range(&self, number: usize, part: Part) -> BufferRange {
         let lane = self.lane(number);
-        self.kin(lane.variant).buffers.range(part, &lane.slices)
+        self.kin(lane.kin).buffers.range(part, &lane.slices)
     }
 
     /// Times of the stages of the last submission, by the stems of their shaders; empty unless created with timestamps.
@@ -149,58 +171,6 @@ impl VulkanLanes {
 
     pub(super) fn lane_mut(&mut self, lane: usize) -> &mut Lane {
         self.lanes[lane].as_mut().unwrap_or_else(|| no_lane(lane))
-    }
-
-    /// Writes the state that a lane begins with.
-    fn begin(&mut self, number: usize, first: Option<&[Fly]>) -> Result<()> {
-        let lane = self.lane(number);
-        let (course, plan) = (lane.course.clone(), lane.plan);
-        self.write(number, Part::Guide, bytemuck::cast_slice(&course.guide.samples))?;
-        self.write(number, Part::Header, bytemuck::bytes_of(&SearchHeader::default()))?;
-        self.write(number, Part::Cells, bytemuck::cast_slice(&vec![CellRecord::default(); plan.cell_count as usize]))?;
-        let standing = match first {
-            Some(flies) => self.write_flies(number, flies)?,
-            None => self.write_bare(number)?,
-        };
-        if let Some(flies) = first.filter(|_| course.rules.leash > 0) {
-            let origins: Vec<FlyRecord> = flies.iter().map(FlyRecord::new).collect();
-            self.write(number, Part::Origins, bytemuck::cast_slice(&origins))?;
-        }
-        let lane = self.lane_mut(number);
-        (lane.standing, lane.objective) = (standing, standing.objective);
-        (lane.wanted, lane.iterations, lane.has_old_depths) = (0, 0, false);
-        (lane.has_failed, lane.failure) = (false, None);
-        lane.has_old_pixels = false;
-        Ok(())
-    }
-
-    /// Without flies the state is known. Stacks that are empty may hold anything.
-    fn write_bare(&mut self, number: usize) -> Result<Standing> {
-        let Lane { course, plan, .. } = self.lane(number);
-        let fly_count = course.fly_count;
-        let (pixels, objective) = state::bare_words(course, plan);
-        self.write(number, Part::Flies, bytemuck::cast_slice(&vec![FlyRecord::new(&Fly::ABSENT); fly_count]))?;
-        self.write(number, Part::Pixels, bytemuck::cast_slice(&pixels))?;
-        self.write(number, Part::Steps, bytemuck::cast_slice(&vec![STEP_FIRST; fly_count]))?;
-        self.write(number, Part::Fitness, bytemuck::cast_slice(&vec![0_i32; fly_count]))?;
-        Ok(Standing { objective, ..Standing::default() })
-    }
-
-    fn write_flies(&mut self, number: usize, flies: &[Fly]) -> Result<Standing> {
-        // It happens once, so the twin's answer is good enough, and exact.
-        let Lane { course, plan, .. } = self.lane(number);
-        let mut twin = CpuSearch::new(course.clone());
-        twin.load(flies)?;
-        let SearchState { flies, steps, fitness } = twin.read_back()?;
-        let (pixels, stacks) = state::state_words(course, plan, &flies, &twin.read_back_stacks()?);
-        let records: Vec<FlyRecord> = flies.iter().map(FlyRecord::new).collect();
-        let fitness: Vec<i32> = fitness.into_iter().map(|fitness| fitness as i32).collect();
-        self.write(number, Part::Flies, bytemuck::cast_slice(&records))?;
-        self.write(number, Part::Pixels, bytemuck::cast_slice(&pixels))?;
-        self.write(number, Part::Steps, bytemuck::cast_slice(&steps))?;
-        self.write(number, Part::Fitness, bytemuck::cast_slice(&fitness))?;
-        self.write(number, Part::Stacks, bytemuck::cast_slice(&stacks))?;
-        Ok(twin.standing())
     }
 
     /// Writes the beginning of a lane's slice.
@@ -234,9 +204,8 @@ impl VulkanLanes {
         let numbers = self.numbers();
         let mut teams = Vec::new();
         for place in 0..self.kins.len() {
-            let variant = self.kins[place].variant;
-            let order: Vec<usize> =
-                numbers.iter().copied().filter(|&number| self.lane(number).variant == variant).collect();
+            let Kin { variant, number: kin, .. } = self.kins[place];
+            let order: Vec<usize> = numbers.iter().copied().filter(|&number| self.lane(number).kin == kin).collect();
             let lanes = || order.iter().map(|&number| self.lane(number));
             let team = lanes().map(|lane| LaneSize::new(&lane.plan, lane.course.fly_count)).collect();
             let rules: Vec<_> =
@@ -247,7 +216,7 @@ impl VulkanLanes {
             teams.push(Team { variant, group: kin.buffers.bind(self.pass.any_pipeline())?, lanes: team });
         }
         self.pass.arrange(&teams)?;
-        (self.is_arranged, self.next_cell) = (true, 0);
+        (self.is_arranged, self.next) = (true, (0, 0));
         Ok(())
     }
 
@@ -263,7 +232,7 @@ impl VulkanLanes {
                 let cells: u32 = busy.iter().map(|&number| self.lane(number).plan.cell_count).sum();
                 (ITERATIONS_MAX / busy.len().max(1) as u32).min(CELLS_MAX / cells.max(1)).max(1)
             }
-            _ => ITERATIONS_MAX,
+            _ => ITERATIONS_MAX_WIDE,
         };
         busy.iter().map(|&number| needed(self.lane(number))).min().unwrap_or(1).clamp(1, most)
     }
@@ -287,14 +256,37 @@ impl VulkanLanes {
         self.pass.record_depths(&mut self.recorder, &with_old_depths)?;
         self.keep_marks(busy)?;
         let (cells, lanes) = self.pass.cells();
-        if self.device.info().kind == DeviceKind::Cpu && cells * lanes > CELLS_MAX {
-            let first = self.next_cell;
-            let end = (first + (CELLS_MAX / lanes).max(1)).min(cells);
-            self.next_cell = if end == cells { 0 } else { end };
-            return self.pass.record_part(&mut self.recorder, first..end);
+        let all = u64::from(cells) * u64::from(lanes);
+        let most = match self.device.info().kind {
+            DeviceKind::Cpu => u64::from(CELLS_MAX.max(lanes)),
+            _ => self.pace.units(),
+        };
+        if all > most || self.next != (0, 0) {
+            let part = self.next_part((cells, lanes), most);
+            self.recorded = part.cells.len() as u64 * part.lanes.len() as u64;
+            return self.pass.record_part(&mut self.recorder, &part);
         }
-        let iterations = self.iterations(busy);
+        let iterations = self.iterations(busy).min((most / all.max(1)).min(u64::from(u32::MAX)) as u32).max(1);
+        self.recorded = all * u64::from(iterations);
         self.pass.record(&mut self.recorder, iterations)
+    }
+
+    /// The next part of an iteration of so many cells and lanes: some cells of all lanes, or one cell of some.
+    fn next_part(&mut self, (cells, lanes): (u32, u32), most: u64) -> CellsPart {
+        let (cell, lane) = self.next;
+        let most = most.min(u64::from(u32::MAX)) as u32;
+        if lane == 0 && most >= lanes {
+            let end = cell.saturating_add(most / lanes.max(1)).min(cells);
+            self.next = if end == cells { (0, 0) } else { (end, 0) };
+            return CellsPart { cells: cell..end, lanes: 0..lanes };
+        }
+        let end = lane.saturating_add(most).min(lanes);
+        self.next = match (cell + 1 == cells, end == lanes) {
+            (true, true) => (0, 0),
+            (false, true) => (cell + 1, 0),
+            (_, false) => (cell, end),
+        };
+        CellsPart { cells: cell..cell + 1, lanes: lane..end }
     }
 
     pub(super) fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
@@ -316,8 +308,8 @@ impl SearchLanes for VulkanLanes {
     }
 
     fn dismiss(&mut self, lane: usize) {
-        if let Some(Lane { slices, course, variant, .. }) = self.lanes[lane].take() {
-            if let Some(kin) = self.kins.iter_mut().find(|kin| kin.variant == variant) {
+        if let Some(Lane { slices, course, kin, .. }) = self.lanes[lane].take() {
+            if let Some(kin) = self.kins.iter_mut().find(|other| other.number == kin) {
                 kin.buffers.dismiss(&slices, &course.masks);
             }
             self.kins.retain(|kin| !kin.buffers.is_empty());
@@ -380,6 +372,7 @@ impl SearchLanes for VulkanLanes {
         self.record(&busy)?;
         let tickets = busy.iter().map(|&number| self.ask_for(number, Part::Header)).collect::<Result<Vec<_>>>()?;
         self.recorder.submit_and_wait()?;
+        self.pace.note(self.recorded, self.recorder.took());
         for lane in self.lanes.iter_mut().flatten() {
             lane.has_old_depths = false;
         }
@@ -388,7 +381,7 @@ impl SearchLanes for VulkanLanes {
             self.lane_mut(number).absorb(&header);
         }
         if !self.lanes.iter().flatten().any(Lane::is_busy) {
-            self.next_cell = 0;
+            self.next = (0, 0);
         }
         Ok(())
     }

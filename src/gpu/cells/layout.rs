@@ -183,6 +183,8 @@ pub struct SearchHeader {
     pub change_high: u32,
     /// Dispatches of cells that had something to do.
     pub iterations: u32,
+    /// The round that the scan began last.
+    pub under_way: u32,
 }
 
 /// `CellRecord`: a cell of the round at hand.
@@ -201,6 +203,11 @@ pub struct CellRecord {
     pub filled: u32,
 }
 
+impl CellRecord {
+    /// A cell without work, as all are between two rounds.
+    pub const DONE: Self = Self { first: 0, count: 0, step: u32::MAX, dealt: 0, filled: 0 };
+}
+
 /// `Push` of all stages of the search.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -209,4 +216,6 @@ pub struct CellsPush {
     pub first_lane: u32,
     /// Most turns of loops in one invocation.
     pub budget: u32,
+    /// The cell that workgroup 0 of a lane works on.
+    pub first_cell: u32,
 }

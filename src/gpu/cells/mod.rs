@@ -4,6 +4,7 @@ mod buffers;
 mod lane;
 pub(super) mod lanes;
 pub mod layout;
+mod loaded;
 mod mark;
 mod pass;
 mod plan;

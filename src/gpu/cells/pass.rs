@@ -90,7 +90,22 @@ impl Team {
     }
 }
 
+/// Cells of a part of an iteration, and the lanes in whose pictures they lie: numbers in the order of dispatches.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct CellsPart {
+    pub cells: Range<u32>,
+    pub lanes: Range<u32>,
+}
+
+impl CellsPart {
+    /// Whether its iteration begins with it.
+    fn is_first(&self) -> bool {
+        self.cells.start == 0 && self.lanes.start == 0
+    }
+}
+
 /// A shader for some of the lanes that share buffers, side by side in their order.
+#[derive(Clone)]
 struct Dispatch {
     pipeline: Arc<ComputePipeline>,
     group: Arc<BindingGroup>,
@@ -98,6 +113,20 @@ struct Dispatch {
     lanes: u32,
     /// Most workgroups that one of them needs.
     workgroups: u32,
+}
+
+impl Dispatch {
+    /// What of it belongs to a part; its lanes have these numbers.
+    fn cut(&self, numbers: Range<u32>, CellsPart { cells, lanes }: &CellsPart) -> Option<Self> {
+        let lanes = lanes.start.max(numbers.start)..lanes.end.min(numbers.end);
+        let cells = cells.start..cells.end.min(self.workgroups);
+        if lanes.is_empty() || cells.is_empty() {
+            return None;
+        }
+        let first_lane = self.push.first_lane + lanes.start - numbers.start;
+        let push = CellsPush { first_lane, first_cell: cells.start, ..self.push };
+        Some(Self { push, lanes: lanes.len() as u32, workgroups: cells.len() as u32, ..self.clone() })
+    }
 }
 
 /// When in an iteration a stage has its turn.
@@ -128,7 +157,7 @@ impl Stage {
         self.dispatches.push(Dispatch {
             pipeline: Arc::clone(pipeline),
             group: Arc::clone(&team.group),
-            push: CellsPush { first_lane: 0, budget: team.variant.shape.budget },
+            push: CellsPush { first_lane: 0, budget: team.variant.shape.budget, first_cell: 0 },
             lanes: team.lanes.len() as u32,
             workgroups,
         });
@@ -239,7 +268,7 @@ impl CellsPass {
             let dispatch = Dispatch {
                 pipeline: Arc::clone(&self.depths),
                 group: Arc::clone(group),
-                push: CellsPush { first_lane: *first_lane, budget: 0 },
+                push: CellsPush { first_lane: *first_lane, budget: 0, first_cell: 0 },
                 lanes: 1,
                 workgroups: *block_count,
             };
@@ -268,38 +297,25 @@ impl CellsPass {
         steps.fold((0, 0), |(cells, lanes), step| (cells.max(step.workgroups), lanes + step.lanes))
     }
 
-    /// Records a part of an iteration: it takes these cells of each lane as far as the budget allows. A round begins
-    /// with the part of the first cell.
-    pub fn record_part(&self, recorder: &mut Recorder, cells: Range<u32>) -> Result<()> {
-        for stage in self.stages.iter().filter(|stage| stage.turn != Turn::Dealing || cells.start == 0) {
+    /// Records a part of an iteration: it takes some cells of some lanes as far as the budget allows. A round begins
+    /// with the first part.
+    pub fn record_part(&self, recorder: &mut Recorder, part: &CellsPart) -> Result<()> {
+        let mut first_lane = 0;
+        for stage in self.stages.iter().filter(|stage| stage.turn != Turn::Dealing || part.is_first()) {
             let mut pass = recorder.compute_pass(stage.name)?;
             for dispatch in &stage.dispatches {
                 if stage.turn == Turn::Cells {
-                    self.dispatch_part(&mut pass, dispatch, &cells);
+                    let lanes = first_lane..first_lane + dispatch.lanes;
+                    first_lane = lanes.end;
+                    if let Some(dispatch) = dispatch.cut(lanes, part) {
+                        self.dispatch(&mut pass, &dispatch);
+                    }
                 } else {
                     self.dispatch(&mut pass, dispatch);
                 }
             }
         }
         Ok(())
-    }
-
-    /// As [`CellsPass::dispatch`], for some workgroups of each lane.
-    fn dispatch_part(&self, pass: &mut ComputePass<'_>, dispatch: &Dispatch, part: &Range<u32>) {
-        let columns = dispatch.workgroups.min(self.device.info().limits.workgroups[0]);
-        if columns < dispatch.workgroups {
-            // Shaders number workgroups by rows, of which a part would have shorter ones. So many cells are rare.
-            if part.start == 0 {
-                self.dispatch(pass, dispatch);
-            }
-            return;
-        }
-        let end = part.end.min(dispatch.workgroups);
-        if part.start < end {
-            pass.bind(&dispatch.pipeline, &dispatch.group);
-            pass.push_constants(bytemuck::bytes_of(&dispatch.push));
-            pass.dispatch_part(part.start, end - part.start, dispatch.lanes);
-        }
     }
 
     fn dispatch(&self, pass: &mut ComputePass<'_>, dispatch: &Dispatch) {
@@ -319,11 +335,11 @@ impl Steps {
         };
         let is_translucent = variant.is_translucent;
         let (name, module) =
-            if is_translucent { ("cells_glazed", shaders::CELLS_GLAZED) } else { ("cells", shaders::CELLS) };
+            if is_translucent { ("cells_glazed", &shaders::CELLS_GLAZED) } else { ("cells", &shaders::CELLS) };
         Ok(Self {
             variant,
             crowd,
-            cells: create_pipeline(device, name, module, &constants)?,
+            cells: create_pipeline(device, name, module.for_device(device.info()), &constants)?,
             fitness: if is_translucent { Some([fitness(0)?, fitness(1)?]) } else { None },
         })
     }

@@ -6,8 +6,8 @@ use crate::model::cells::Course;
 use crate::model::cells::pixel::TRANSLUCENT_DEPTH;
 use crate::vk::{DeviceInfo, DeviceKind};
 
-/// Turns of loops that software Vulkan grants an invocation, less a margin. On hardware this keeps a dispatch to some
-/// milliseconds.
+/// Turns of loops that lavapipe grants an invocation, less a margin. On hardware this keeps a dispatch to some
+/// milliseconds; there a single step may take more.
 const BUDGET: u32 = 60_000;
 /// Most invocations of a workgroup that is chosen here.
 const LANES_MAX: u32 = 1_024;
@@ -30,44 +30,55 @@ pub struct CellShape {
     pub lanes: u32,
     /// How they work together.
     pub form: CellForm,
-    /// Most turns of loops in an invocation of one dispatch. Software Vulkan ends all loops of an invocation silently
-    /// after 65,535 turns (Mesa 22.3.6, llvmpipe).
+    /// Most turns of loops in an invocation of one dispatch.
     pub budget: u32,
 }
 
 impl CellShape {
-    /// The shape for a device: the fewest invocations whose longest step fits the budget.
+    /// The shape for a device: the fewest invocations whose longest step fits the budget. If there is none, the most
+    /// invocations, and as many turns as that step takes.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] if the steps of this search are too long for any.
+    /// [`Error::TooLarge`] if the device cuts loops short, and the steps of this search are too long for it.
     pub fn for_device(info: &DeviceInfo, course: &Course) -> Result<Self> {
         // All flies may lie in one cell, whose members are ranked eight in a turn of a loop.
-        if info.kind == DeviceKind::Cpu && course.fly_count as u64 > 8 * u64::from(BUDGET) {
+        if info.cuts_loops_short() && course.fly_count as u64 > 8 * u64::from(BUDGET) {
             let what = format!("{} tiles are too many for one dispatch of software Vulkan", course.fly_count);
             return Err(Error::TooLarge { what, remedies: &[Remedy::FewerTiles, Remedy::Cpu] });
         }
         let narrow = Self { lanes: info.subgroup_size, form: CellForm::Narrow, budget: BUDGET };
         let wide = |lanes| Self { lanes, form: CellForm::Wide, budget: BUDGET };
         let most = LANES_MAX.min(info.limits.workgroup_invocations);
-        let first = if info.kind == DeviceKind::Cpu { Some(narrow) } else { None };
-        let lanes = (LANES_WIDE.ilog2()..=most.ilog2()).map(|power| 1 << power);
+        let first = (info.kind == DeviceKind::Cpu && info.has_subgroup_arithmetic()).then_some(narrow);
+        // What software gains by width it pays for barriers.
+        let narrowest =
+            if info.kind == DeviceKind::Cpu { (2 * info.subgroup_size).min(LANES_WIDE) } else { LANES_WIDE };
+        let lanes = (narrowest.ilog2()..=most.ilog2()).map(|power| 1 << power);
         let mut shapes = first.into_iter().chain(lanes.map(wide));
-        shapes.find(|shape| shape.longest_step(course) <= u64::from(BUDGET)).ok_or_else(|| {
-            let what = format!(
-                "one step of {} candidates with tiles this large is too long for a dispatch of the Vulkan device",
-                course.rules.candidates
-            );
-            Error::TooLarge { what, remedies: &[Remedy::MoreTiles, Remedy::FewerCandidates, Remedy::Cpu] }
-        })
+        if let Some(shape) = shapes.find(|shape| shape.longest_step(course) <= u64::from(BUDGET)) {
+            return Ok(shape);
+        }
+        let widest = wide(1 << most.ilog2());
+        let longest = widest.longest_step(course);
+        u32::try_from(longest)
+            .ok()
+            .filter(|_| !info.cuts_loops_short())
+            .map(|budget| Self { budget, ..widest })
+            .ok_or_else(|| {
+                let what = format!(
+                    "one step of {} candidates with tiles this large is too long for a dispatch of the Vulkan device",
+                    course.rules.candidates
+                );
+                Error::TooLarge { what, remedies: &[Remedy::MoreTiles, Remedy::FewerCandidates, Remedy::Cpu] }
+            })
     }
 
     /// Refuses a narrow workgroup that is not one subgroup.
     pub(super) fn check(self, info: &DeviceInfo) -> Result<()> {
-        if self.form == CellForm::Narrow && self.lanes != info.subgroup_size {
-            return Err(Error::parameter(
-                "lanes",
-                format!("a narrow workgroup has the {} of a subgroup, not {}", info.subgroup_size, self.lanes),
-            ));
+        let size = if info.has_subgroup_arithmetic() { info.subgroup_size } else { 1 };
+        if self.form == CellForm::Narrow && self.lanes != size {
+            let reason = format!("a narrow workgroup has the {size} of a subgroup, not {}", self.lanes);
+            return Err(Error::parameter("lanes", reason));
         }
         Ok(())
     }

@@ -55,6 +55,7 @@ impl VulkanLanes {
         (lane.standing, lane.iterations, lane.wanted) = (mark.standing, mark.iterations, mark.standing.rounds);
         let header = lane.header();
         self.write(number, Part::Header, bytemuck::bytes_of(&header))?;
+        self.end_cells(number)?;
         let Lane { mark, has_old_pixels, .. } = self.lanes[number].as_mut().unwrap_or_else(|| no_lane(number));
         if let Some(mark) = mark.as_ref().filter(|mark| !mark.is_due) {
             *has_old_pixels = true;

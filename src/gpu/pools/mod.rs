@@ -247,7 +247,7 @@ impl<const POOLS: usize> Pools<POOLS> {
     fn units_max(&self, pool: usize) -> u64 {
         let parts = self.spec.parts.iter().filter(|part| part.pool == pool);
         let unit_bytes = parts.map(|part| part.unit_bytes).max().unwrap_or(1);
-        self.device.info().limits.storage_buffer_bytes / unit_bytes as u64
+        self.device.info().limits.largest_storage_buffer_bytes() / unit_bytes as u64
     }
 
     fn bytes_of(&self, units: &[u64; POOLS]) -> u64 {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::queue::Queue;
 use super::stages::{Done, Outlets, Pipeline, Ready, Report};
+use crate::cli::args::computing::OnDeviceLost;
 use crate::cli::jobs::prepared::Evolved;
 use crate::cli::terminal::advice::why_no_vulkan;
 use crate::cli::terminal::aside::unless_it_panics;
@@ -80,8 +81,9 @@ impl<'a, 'p> Crew<'a, 'p> {
         }))
     }
 
-    /// Evolves all pictures of the queue.
-    pub(super) fn work(&mut self, queue: &Queue<Ready<'a>>) {
+    /// Evolves all pictures of the queue. Returns those that are left to the CPU, since the device is lost and nobody
+    /// else is there.
+    pub(super) fn work(&mut self, queue: &Queue<Ready<'a>>) -> Vec<Ready<'a>> {
         loop {
             let worked = self.fill(queue).and_then(|()| self.step());
             if let Err(error) = worked {
@@ -89,10 +91,14 @@ impl<'a, 'p> Crew<'a, 'p> {
             }
             self.count();
             if self.pipeline.interrupt.is_requested() {
-                return self.abandon(queue);
+                self.abandon(queue);
+                return Vec::new();
             }
             if self.aboard.is_empty() && self.held.is_none() && queue.is_ended() {
-                return;
+                match self.outlets.orphans.wait() {
+                    Some(orphan) => self.held = Some(orphan),
+                    None => return Vec::new(),
+                }
             }
         }
     }
@@ -103,8 +109,8 @@ impl<'a, 'p> Crew<'a, 'p> {
         while self.aboard.len() < self.in_flight && !self.is_full {
             let next = match self.held.take() {
                 Some(held) => Some(held),
-                None if self.aboard.is_empty() => queue.take(),
-                None => queue.take_if_ready(),
+                None if self.aboard.is_empty() => queue.take_or(|| self.outlets.orphans.take()),
+                None => self.outlets.orphans.take().or_else(|| queue.take_if_ready()),
             };
             let Some(picture) = next else { break };
             match self.admit(picture)? {
@@ -135,7 +141,10 @@ impl<'a, 'p> Crew<'a, 'p> {
                 self.is_full = true;
                 Ok(Admitted::Later)
             }
-            Err(error @ Error::DeviceLost { .. }) => Err(error),
+            Err(error @ Error::DeviceLost { .. }) => {
+                self.held = Some(picture);
+                Err(error)
+            }
             Err(error) if self.device.is_asked_for() => {
                 self.pipeline.fail(picture.row, error, &self.outlets.reports);
                 Ok(Admitted::Aboard)
@@ -184,8 +193,9 @@ impl<'a, 'p> Crew<'a, 'p> {
         self.counted = Counted { at: Instant::now(), evals };
     }
 
-    /// Draws a picture that is done, and hands it to the threads that save.
+    /// Draws a picture that is done, and hands it to the threads that save. If the device is lost, it stays on board.
     fn send_on(&mut self, Aboard { mut picture, began }: Aboard<'a>, finished: Finished) -> Result<()> {
+        let ticket = finished.ticket;
         self.is_full = false;
         picture.row.evolve_ms = milliseconds(began.elapsed());
         let _span = self.pipeline.tracer.span("finish").tell("picture", picture.row.id.as_str());
@@ -197,11 +207,7 @@ impl<'a, 'p> Crew<'a, 'p> {
                 drop(self.outlets.done.send(Done { ready: picture, ending, drawn }));
             }
             Err(error @ Error::DeviceLost { .. }) => {
-                self.pipeline.fail(
-                    picture.row,
-                    Error::DeviceLost { last_pass: "draw".to_owned() },
-                    &self.outlets.reports,
-                );
+                self.aboard.insert(ticket, Aboard { picture, began });
                 return Err(error);
             }
             Err(error) => self.pipeline.fail(picture.row, error, &self.outlets.reports),
@@ -209,12 +215,33 @@ impl<'a, 'p> Crew<'a, 'p> {
         Ok(())
     }
 
-    /// Ends the batch, since the device failed for all its pictures.
-    fn give_up(&mut self, error: Error) {
-        self.aboard.clear();
-        self.held = None;
-        self.pipeline.schedule.end();
+    /// The device failed for all its pictures. Where it is lost, another device takes them, or else the CPU, if that
+    /// was asked for: then they are returned. Otherwise the batch ends.
+    fn give_up(&mut self, error: Error) -> Vec<Ready<'a>> {
+        let aboard = self.aboard.drain().map(|(_, aboard)| aboard.picture);
+        let pictures: Vec<Ready<'a>> = aboard.chain(self.held.take()).collect();
+        let Pipeline { on_device_lost, schedule, .. } = self.pipeline;
+        let told = |rest: &str| {
+            let told = format!("{}: {error}; {rest}", self.device.label());
+            let _ = self.outlets.reports.send(Report::Warning(told));
+        };
+        if matches!(error, Error::DeviceLost { .. }) {
+            match self.outlets.orphans.give(pictures) {
+                Ok(()) => {
+                    told("the other devices take its pictures");
+                    return Vec::new();
+                }
+                Err(pictures) if *on_device_lost == OnDeviceLost::Cpu => {
+                    told("the CPU makes the rest");
+                    return pictures;
+                }
+                Err(_) => {}
+            }
+        }
+        schedule.end();
         let _ = self.outlets.reports.send(Report::Fatal(error));
+        self.outlets.orphans.quit();
+        Vec::new()
     }
 
     /// Abandons all pictures. Those that are not finished leave no files.
@@ -225,5 +252,6 @@ impl<'a, 'p> Crew<'a, 'p> {
         self.pipeline.schedule.end();
         // Threads that read may be waiting for room.
         while queue.take().is_some() {}
+        self.outlets.orphans.quit();
     }
 }

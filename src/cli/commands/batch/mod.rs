@@ -4,6 +4,7 @@ mod crew;
 mod earlier;
 mod existing;
 mod gate;
+mod orphans;
 mod pipeline;
 mod places;
 mod queue;
@@ -27,6 +28,7 @@ use self::stages::{Pipeline, Report};
 use self::summary::Summary;
 use crate::cli::args::computing;
 use crate::cli::args::typed::Typed;
+use crate::cli::checks::{self, Checked};
 use crate::cli::files::destination::Overwrite;
 use crate::cli::files::memory;
 use crate::cli::jobs::row::{Row, Status};
@@ -38,6 +40,7 @@ use crate::cli::terminal::{self, Verbosity, advice, words};
 use crate::cli::trace;
 use crate::error::{Error, Result};
 use crate::output::Journal;
+use crate::studio::Device;
 use crate::vk::Validation;
 
 /// Exit code of a batch in which some pictures failed.
@@ -107,6 +110,9 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
     if verbosity > Verbosity::Quiet {
         workers.iter().for_each(|worker| computing::say_device(&worker.device));
     }
+    if args.check {
+        workers.iter().try_for_each(|worker| check(&worker.device, args))?;
+    }
     workers.iter().for_each(|worker| trace::trace_device(&tracer, &worker.device));
     let pipeline = Pipeline {
         items: &items,
@@ -117,6 +123,7 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
         shard,
         schedule: &Schedule::new(&items),
         gate: &Gate::new(memory::share_of_free()),
+        on_device_lost: computing.on_device_lost,
         interrupt: &interrupt,
         tracer: &tracer,
     };
@@ -132,6 +139,26 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
         None if summary.failed() > 0 => Ok(EXIT_SOME_FAILED),
         None => Ok(0),
     }
+}
+
+/// Ends the batch before it begins if a device does not give what the CPU gives.
+fn check(device: &Device, args: &BatchArgs) -> Result<()> {
+    if device.is_cpu() {
+        return Ok(());
+    }
+    let progress = Progress::new(args.messages.progress.unless(args.messages.quiet), args.messages.verbosity());
+    let made = checks::run_all(device, progress)?;
+    let wrong: Vec<&Checked> = made.iter().filter(|check| check.outcome.is_wrong()).collect();
+    let Some(first) = wrong.first() else { return Ok(()) };
+    let detail = first.detail.as_deref().unwrap_or("it is different");
+    Err(Error::Usage(format!(
+        "--check: {} does not give what the CPU gives in {} of {} checks ({}: {detail}); use --device cpu, and see \
+         smalti check",
+        device.label(),
+        wrong.len(),
+        made.len(),
+        first.name
+    )))
 }
 
 /// Says how many outputs are there already, and what becomes of them.

@@ -14,6 +14,7 @@ use rayon::ThreadPool;
 
 use super::crew::Crew;
 use super::existing::{self, Verdict};
+use super::orphans::{Orphans, QuitsInPanic};
 use super::queue::Queue;
 use super::stages::{Done, InFlight, Outlets, Pipeline, Ready, Report, Work, Worker, tell};
 use crate::cli::files::destination::Destination;
@@ -67,14 +68,21 @@ impl<'a> Pipeline<'a> {
         let (ready_in, ready_out) = sync_channel(in_flight);
         let (done_in, done_out) = sync_channel(self.io_threads.save);
         let (ready_out, done_out) = (Arc::new(Queue::new(ready_out)), Arc::new(Queue::new(done_out)));
+        let orphans = Arc::new(Orphans::new());
         let save = || {
             let (done, reports) = (Arc::clone(&done_out), reports.clone());
             threads::spawn_in(scope, move || self.save_all(&done, &reports)).map(drop)
         };
         let evolve = |(worker, crew): (&'a Worker, Hands<'a>)| {
             let ready = Arc::clone(&ready_out);
-            let outlets = Outlets { done: done_in.clone(), reports: reports.clone() };
-            threads::spawn_in(scope, move || self.evolve_all(&worker.device, crew, &ready, &outlets)).map(drop)
+            let outlets = Outlets { done: done_in.clone(), reports: reports.clone(), orphans: Arc::clone(&orphans) };
+            orphans.enter();
+            let evolve = move || self.evolve_all(&worker.device, crew, &ready, &outlets);
+            let spawned = threads::spawn_in(scope, evolve).map(drop);
+            if spawned.is_err() {
+                orphans.quit();
+            }
+            spawned
         };
         let read = || {
             let (ready, reports) = (ready_in.clone(), reports.clone());
@@ -167,12 +175,21 @@ impl<'a> Pipeline<'a> {
 
     /// The work of a thread that evolves.
     fn evolve_all(&self, device: &Device, hands: Hands<'_>, ready: &Queue<Ready<'a>>, outlets: &Outlets<'a>) {
+        let _quits = QuitsInPanic(&outlets.orphans);
         let reports = &outlets.reports;
         let on_cpu = Device::cpu();
         let (device, pool) = match hands {
             Hands::Pool(pool) => (device, Some(pool)),
             Hands::Lanes(in_flight) => match Crew::muster(self, device, in_flight, outlets.clone()) {
-                Ok(Some(mut crew)) => return crew.work(ready),
+                Ok(Some(mut crew)) => {
+                    let left = crew.work(ready);
+                    if left.is_empty() {
+                        return;
+                    }
+                    drop(crew);
+                    left.into_iter().for_each(|picture| self.evolve_one(&on_cpu, None, picture, outlets));
+                    (&on_cpu, None)
+                }
                 Ok(None) => (device, None),
                 // The user did not name this device, so the CPU may replace it: the bytes are the same.
                 Err(error) if !device.is_asked_for() => {
@@ -180,10 +197,14 @@ impl<'a> Pipeline<'a> {
                         reports.send(Report::Warning(format!("computing on the CPU, since {}", why_no_vulkan(&error))));
                     (&on_cpu, None)
                 }
-                Err(error) => return drop(reports.send(Report::Fatal(error))),
+                Err(error) => {
+                    outlets.orphans.quit();
+                    return drop(reports.send(Report::Fatal(error)));
+                }
             },
         };
-        while let Some(picture) = ready.take() {
+        let next = || ready.take_or(|| outlets.orphans.take()).or_else(|| outlets.orphans.wait());
+        while let Some(picture) = next() {
             if self.interrupt.is_requested() {
                 self.schedule.end();
                 continue;

@@ -1,8 +1,12 @@
 //! Queues from one stage to the threads of the next.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::sync::{Mutex, PoisonError, TryLockError};
+use std::time::Duration;
+
+/// Time between two looks at what else there is to do.
+const LOOK_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The receiving end of a channel, shared by several threads.
 pub(super) struct Queue<T> {
@@ -22,6 +26,24 @@ impl<T> Queue<T> {
             self.is_ended.store(true, Ordering::Relaxed);
         }
         next
+    }
+
+    /// As [`Queue::take`], or what `other` gives, whichever comes first.
+    pub(super) fn take_or(&self, other: impl Fn() -> Option<T>) -> Option<T> {
+        loop {
+            if let Some(other) = other() {
+                return Some(other);
+            }
+            let next = self.receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOOK_INTERVAL);
+            match next {
+                Ok(next) => return Some(next),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    self.is_ended.store(true, Ordering::Relaxed);
+                    return None;
+                }
+            }
+        }
     }
 
     /// The next item, if there is one now. Also none while another thread waits, since that one will get it.

@@ -1,12 +1,15 @@
 //! The forms of a picture at each stage of a batch, and what all threads share.
 
+use std::sync::Arc;
 use std::sync::mpsc::{Sender, SyncSender};
 
 use rayon::ThreadPool;
 
 use super::earlier::Earlier;
 use super::gate::{Gate, Permit};
+use super::orphans::Orphans;
 use super::schedule::Schedule;
+use crate::cli::args::computing::OnDeviceLost;
 use crate::cli::files::destination::Destination;
 use crate::cli::jobs::options::PictureOptions;
 use crate::cli::jobs::prepared::{Evolved, Keep, Prepared};
@@ -49,6 +52,7 @@ pub(super) struct Pipeline<'a> {
     pub shard: Option<Shard>,
     pub schedule: &'a Schedule,
     pub gate: &'a Gate,
+    pub on_device_lost: OnDeviceLost,
     pub interrupt: &'a Interrupt,
     /// Records what all threads do.
     pub tracer: &'a Tracer,
@@ -94,6 +98,8 @@ pub(super) struct Done<'a> {
 pub(super) struct Outlets<'a> {
     pub done: SyncSender<Done<'a>>,
     pub reports: Sender<Report>,
+    /// Pictures of devices that were lost.
+    pub orphans: Arc<Orphans<Ready<'a>>>,
 }
 
 impl<'a> Pipeline<'a> {

@@ -12,7 +12,7 @@ use crate::evolve::evolution::random_population;
 use crate::evolve::style::Style;
 use crate::evolve::{ColorMode, Ended, Evolution, PaperScheme, Undisturbed};
 use crate::model::cells::{Course, Search};
-use crate::model::{Backdrop, Canvas, Change, Fly, Population, Scene, Target};
+use crate::model::{Backdrop, Blend, Canvas, Change, Fly, Population, Scene, Target};
 use crate::shapes::{BuiltIn, Shader};
 use crate::studio::{self, Device, Mask, OpenedSearch, Picture, Recipe, make_all};
 
@@ -37,12 +37,14 @@ type Work = Box<dyn Fn(&Device) -> Result<Vec<Part>>>;
 /// One check.
 pub(super) struct Trial {
     pub name: String,
+    /// Whether the device's share of it is to draw with graphics. For a device without, the CPU does that.
+    pub needs_graphics: bool,
     work: Work,
 }
 
 impl Trial {
     fn new(name: impl Into<String>, work: impl Fn(&Device) -> Result<Vec<Part>> + 'static) -> Self {
-        Self { name: name.into(), work: Box::new(work) }
+        Self { name: name.into(), needs_graphics: false, work: Box::new(work) }
     }
 
     /// Computes everything on a device.
@@ -212,10 +214,11 @@ fn drawings(target: &Arc<Target>) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     for (name, style) in [("opaque", "mosaic"), ("translucent", "spray")] {
         let stage = studio::work(target, &recipe(style)?.masks(all_shapes()?).shader(Shader::Emboss))?.stage;
+        let needs_graphics = stage.masks.blend() == Blend::Opaque;
         let flies = dressed_flies(stage.masks.layers().len(), 4);
         let over_color = Population { flies, ..stage };
         let over_nothing = Population { background: Backdrop::Transparent, ..over_color.clone() };
-        trials.push(Trial::new(format!("drawing, {name}"), move |device| {
+        let trial = Trial::new(format!("drawing, {name}"), move |device| {
             let mut painter = device.open_painter()?;
             let mut parts = Vec::new();
             for population in [&over_color, &over_nothing] {
@@ -224,7 +227,8 @@ fn drawings(target: &Arc<Target>) -> Result<Vec<Trial>> {
                 }
             }
             Ok(parts)
-        }));
+        });
+        trials.push(Trial { needs_graphics, ..trial });
     }
     Ok(trials)
 }

@@ -1,27 +1,23 @@
 //! `smalti check`: whether a Vulkan device gives what the CPU gives, number by number, on the machine of whoever asks.
 
-mod numbers;
-mod trials;
-
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::HumanCount;
 use serde::Serialize;
-use serde_json::{Map, Value};
 
-use self::trials::Trial;
-use crate::cli::args::computing::{self, ComputingArgs};
-use crate::cli::terminal::progress::{Progress, ProgressKind, Stage};
-use crate::cli::terminal::{self, Verbosity, advice, milliseconds, words};
+use crate::cli::args::computing::{Computing, ComputingArgs};
+use crate::cli::checks::{Checked, Outcome, run_all};
+use crate::cli::terminal::progress::{Progress, ProgressKind};
+use crate::cli::terminal::{self, Verbosity, words};
 use crate::error::{Error, NoDevice, Result};
 use crate::studio::Device;
 use crate::vk::Validation;
 
 const AFTER_HELP: &str = "\
 Each line of the table is one part of smalti. It is computed on the device and on the CPU, and all numbers must be equal. If one \
-line says something else, please report it with what --json prints, and use --device cpu until then. The parts:
+line says something else, please report it with what --json prints, and use --device cpu until then. Drawing is skipped where the \
+CPU does it, since the device has no graphics. The parts:
   fitness   the two nearest tiles of every pixel, the error, and the marginal fitness of every tile
   paper     the published algorithm, birth by birth
   search    the search in cells: tiles, step sizes, fitness and what lies on every pixel, for each style and for 1, 8 and 64
@@ -31,7 +27,7 @@ line says something else, please report it with what --json prints, and use --de
 
 Exit codes: 0 all checks are equal; 1 some differ or failed; 2 wrong usage; 4 there is no Vulkan device to check.
 --json prints one object with schema, schema_version, version, os, architecture, device, driver, equal and checks. Each check has \
-name, outcome (equal, different, failed), detail, numbers, device_ms and cpu_ms.
+name, outcome (equal, different, failed, skipped), detail, numbers, device_ms and cpu_ms.
 
 Examples:
   smalti check
@@ -55,28 +51,6 @@ pub(crate) struct CheckArgs {
     /// Say nothing but errors
     #[arg(short, long, help_heading = "Messages")]
     pub quiet: bool,
-}
-
-/// How a check came out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Outcome {
-    Equal,
-    Different,
-    Failed,
-}
-
-/// What is known of a check.
-#[derive(Clone, Debug, Serialize)]
-struct Checked {
-    name: String,
-    outcome: Outcome,
-    /// The first difference, or why it failed.
-    detail: Option<String>,
-    /// How many numbers were compared.
-    numbers: usize,
-    device_ms: f64,
-    cpu_ms: f64,
 }
 
 /// Everything that was checked, as in the JSON.
@@ -108,7 +82,7 @@ fn try_check(args: &CheckArgs) -> Result<bool> {
     let validation = if args.validate { Validation::On } else { Validation::Off };
     let computing = args.computing.check(validation)?;
     computing.start_threads()?;
-    let device = the_device_itself(computing.select()?, validation)?;
+    let device = the_device_itself(&computing)?;
     let progress = Progress::new(args.progress.unless(args.quiet), verbosity);
     let checks = run_all(&device, progress)?;
     let report = Report {
@@ -119,7 +93,7 @@ fn try_check(args: &CheckArgs) -> Result<bool> {
         architecture: std::env::consts::ARCH,
         device: device.label().to_owned(),
         driver: device.driver(),
-        equal: checks.iter().all(|check| check.outcome == Outcome::Equal),
+        equal: !checks.iter().any(|check| check.outcome.is_wrong()),
         checks,
     };
     if args.json {
@@ -132,7 +106,8 @@ fn try_check(args: &CheckArgs) -> Result<bool> {
 }
 
 /// The device, opened so that the CPU never stands in for it.
-fn the_device_itself(device: Device, validation: Validation) -> Result<Device> {
+fn the_device_itself(computing: &Computing) -> Result<Device> {
+    let device = computing.select_itself()?;
     let Some(vulkan) = device.vulkan() else {
         let reason = device.stand_in_reason().map_or_else(String::new, |reason| format!(", since {reason}"));
         let why = format!(
@@ -146,71 +121,31 @@ fn the_device_itself(device: Device, validation: Validation) -> Result<Device> {
     }
     let name = format!("uuid:{}", vulkan.info().uuid);
     drop(device);
-    computing::select(&name.parse()?, validation)
-}
-
-/// Makes all checks. One that the device fails stops no other, unless the device is lost: then it is the last one.
-fn run_all(device: &Device, mut progress: Progress) -> Result<Vec<Checked>> {
-    let (twin, began) = (Device::cpu(), Instant::now());
-    let trials = trials::all()?;
-    let mut checks = Vec::with_capacity(trials.len());
-    for trial in &trials {
-        let (checked, is_lost) = run(trial, device, &twin)?;
-        checks.push(checked);
-        if is_lost {
-            break;
-        }
-        let standing = ChecksDone { elapsed: began.elapsed(), done: checks.len(), all: trials.len() };
-        if progress.is_due(standing.elapsed) {
-            progress.show(&standing);
-        }
-    }
-    progress.finish();
-    Ok(checks)
-}
-
-/// Makes a check; returns whether the device is lost, too.
-///
-/// # Errors
-/// If the CPU fails.
-fn run(trial: &Trial, device: &Device, twin: &Device) -> Result<(Checked, bool)> {
-    let timed = |device: &Device| {
-        let began = Instant::now();
-        let found = trial.run(device);
-        (found, milliseconds(began.elapsed()))
-    };
-    let ((found, device_ms), (expected, cpu_ms)) = (timed(device), timed(twin));
-    let expected = expected?;
-    let numbers = numbers::count(&expected);
-    let is_lost = matches!(found, Err(Error::DeviceLost { .. }));
-    let (outcome, detail) = match found {
-        Err(error) if is_lost => (Outcome::Failed, Some(format!("{error}; no more checks were made"))),
-        Err(error) => (Outcome::Failed, Some(advice::sentence(&error))),
-        Ok(found) => match numbers::first_difference(&found, &expected) {
-            None => (Outcome::Equal, None),
-            difference => (Outcome::Different, difference),
-        },
-    };
-    Ok((Checked { name: trial.name.clone(), outcome, detail, numbers, device_ms, cpu_ms }, is_lost))
+    computing.of(name.parse()?).select_itself()
 }
 
 /// The report for people.
 fn table(report: &Report) -> String {
     let driver = report.driver.as_deref().unwrap_or_default();
     let mut text = format!("smalti {} on {} ({driver})\n", report.version, report.device);
+    let made = report.checks.iter().filter(|check| check.outcome != Outcome::Skipped).count();
     let width = report.checks.iter().map(|check| check.name.len()).max().unwrap_or_default();
     for Checked { name, outcome, detail, device_ms, cpu_ms, .. } in &report.checks {
         let told = match outcome {
             Outcome::Equal => "equal",
             Outcome::Different => "DIFFERENT",
             Outcome::Failed => "FAILED",
+            Outcome::Skipped => "skipped",
         };
-        text += &format!("{name:<width$}  {told:<9}  {device_ms:>7.0} ms, on the CPU {cpu_ms:>6.0} ms\n");
+        text += &match outcome {
+            Outcome::Skipped => format!("{name:<width$}  {told}\n"),
+            _ => format!("{name:<width$}  {told:<9}  {device_ms:>7.0} ms, on the CPU {cpu_ms:>6.0} ms\n"),
+        };
         detail.iter().for_each(|detail| text += &format!("  {detail}\n"));
     }
     let numbers: usize = report.checks.iter().map(|check| check.numbers).sum();
-    let wrong = report.checks.iter().filter(|check| check.outcome != Outcome::Equal).count();
-    let all = words::counted(report.checks.len() as u64, "check");
+    let wrong = report.checks.iter().filter(|check| check.outcome.is_wrong()).count();
+    let all = words::counted(made as u64, "check");
     text + &if wrong == 0 {
         format!(
             "{all}, {} numbers: all are equal, so this device makes the same mosaics as the CPU\n",
@@ -221,35 +156,6 @@ fn table(report: &Report) -> String {
             "{wrong} of {all} did not come out equal, so use --device cpu for now; please report this with what smalti \
              check --json and smalti devices --json print\n"
         )
-    }
-}
-
-/// How far the checks have come.
-struct ChecksDone {
-    elapsed: Duration,
-    done: usize,
-    all: usize,
-}
-
-impl Stage for ChecksDone {
-    fn elapsed(&self) -> Duration {
-        self.elapsed
-    }
-
-    fn share(&self) -> f64 {
-        self.done as f64 / self.all as f64
-    }
-
-    fn eta_s(&self) -> Option<f64> {
-        Some(self.elapsed.as_secs_f64() / self.done as f64 * (self.all - self.done) as f64)
-    }
-
-    fn count(&self) -> String {
-        format!("{}/{} checks", self.done, self.all)
-    }
-
-    fn json(&self) -> Map<String, Value> {
-        Map::from_iter([("checks".to_owned(), self.done.into()), ("check_count".to_owned(), self.all.into())])
     }
 }
 
@@ -282,7 +188,9 @@ mod tests {
         let text = table(&report(vec![checked(Outcome::Equal, None), checked(Outcome::Different, Some(detail))]));
         assert!(text.contains(&format!("DIFFERENT       12 ms, on the CPU      3 ms\n  {detail}\n")), "{text}");
         assert!(text.contains("1 of 2 checks did not come out equal") && text.contains("--json"), "{text}");
-        let text = table(&report(vec![checked(Outcome::Equal, None)]));
+        let skipped = Checked { numbers: 0, ..checked(Outcome::Skipped, Some("it has no graphics")) };
+        let text = table(&report(vec![checked(Outcome::Equal, None), skipped]));
+        assert!(text.contains("search  skipped\n  it has no graphics\n"), "{text}");
         assert!(
             text.ends_with("1 check, 1,500 numbers: all are equal, so this device makes the same mosaics as the CPU\n")
         );

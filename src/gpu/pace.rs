@@ -1,0 +1,104 @@
+//! How much work a submission takes on. A driver ends a submission that lasts too long (Windows after two seconds,
+//! others after about ten), and one that is over at once leaves the device waiting for the host. So the amount follows
+//! the time that the last submissions took. No result depends on it.
+
+use std::time::Duration;
+
+use crate::vk::DeviceKind;
+
+/// A submission that takes longer is too long.
+const LONGEST: Duration = Duration::from_millis(200);
+/// What a submission that was too long is cut to.
+const AIM: Duration = Duration::from_millis(100);
+/// A submission that takes less may be longer.
+const SHORTEST: Duration = Duration::from_millis(50);
+
+/// The most units of work of a submission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Pace {
+    units: u64,
+    most: u64,
+}
+
+impl Pace {
+    /// Begins with so many units, and never takes more than `most`.
+    pub fn new(first: u64, most: u64) -> Self {
+        Self { units: first.clamp(1, most), most }
+    }
+
+    /// As [`Pace::new`] for hardware. Software Vulkan has no watchdog: there a submission takes what it is given.
+    pub fn for_kind(kind: DeviceKind, first: u64) -> Self {
+        Self::new(if kind == DeviceKind::Cpu { u64::MAX } else { first }, u64::MAX)
+    }
+
+    /// The most units of the next submission.
+    pub fn units(&self) -> u64 {
+        self.units
+    }
+
+    /// Learns from a submission of so many units.
+    pub fn note(&mut self, units: u64, took: Duration) {
+        if took > LONGEST {
+            let share = AIM.as_secs_f64() / took.as_secs_f64();
+            // Less than it had, whatever is rounded.
+            self.units = ((units as f64 * share) as u64).min(self.units).max(1);
+        } else if took < SHORTEST && units.saturating_mul(2) > self.units {
+            // It was nearly as much as it might be.
+            self.units = self.units.saturating_mul(2).min(self.most);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn ms(count: u64) -> Duration {
+        Duration::from_millis(count)
+    }
+
+    #[test]
+    fn a_submission_that_took_too_long_is_followed_by_shorter_ones() {
+        let mut pace = Pace::new(1_000, 4_000);
+        pace.note(1_000, ms(1_000));
+        assert_eq!(pace.units(), 100);
+        for _ in 0..8 {
+            let units = pace.units();
+            pace.note(units, ms(3_000));
+        }
+        assert_eq!(pace.units(), 1, "there is always something to do");
+    }
+
+    #[test]
+    fn short_submissions_grow_until_they_are_long_enough() {
+        let mut pace = Pace::new(8, 4_000);
+        // A device that makes a unit in a tenth of a millisecond.
+        let mut units = Vec::new();
+        for _ in 0..12 {
+            pace.note(pace.units(), Duration::from_micros(100 * pace.units()));
+            units.push(pace.units());
+        }
+        assert_eq!(units[..7], [16, 32, 64, 128, 256, 512, 512], "{units:?}");
+        assert_eq!(units[11], 512);
+        let mut fast = Pace::new(8, 40);
+        for _ in 0..5 {
+            fast.note(fast.units(), ms(0));
+        }
+        assert_eq!(fast.units(), 40);
+    }
+
+    #[test]
+    fn a_submission_that_had_little_to_do_says_nothing() {
+        let mut pace = Pace::new(100, 4_000);
+        pace.note(10, ms(1));
+        assert_eq!(pace.units(), 100);
+        pace.note(10, ms(400));
+        assert_eq!(pace.units(), 2, "but for one that was too long");
+    }
+
+    #[test]
+    fn software_takes_what_it_is_given() {
+        assert_eq!(Pace::for_kind(DeviceKind::Cpu, 5).units(), u64::MAX);
+        assert_eq!(Pace::for_kind(DeviceKind::Integrated, 5).units(), 5);
+    }
+}
