@@ -1,13 +1,11 @@
 //! The validation canary: runs a test on software Vulkan under the validation layer and fails it if the layer
-//! complains, for instance about a missing barrier or about an object that outlives its device.
-//!
-//! With `SMALTI_TEST_STAGING=forced` in the environment every test goes through staging, as on a discrete GPU; software
-//! Vulkan would never take that path by itself.
+//! complains, for instance about a missing barrier or about an object that outlives its device. Through
+//! `tools/shaped discrete,staging` the same tests take the paths of a discrete GPU.
 
 use std::sync::Arc;
 
 use smalti::vk::{
-    Choice, Device, DeviceInfo, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Staging, Validation, choose,
+    Choice, Device, DeviceInfo, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, choose,
 };
 
 /// Runs `test` on a fresh device, drops everything, and returns what the validation layer said.
@@ -37,12 +35,9 @@ pub fn watch_changed<T>(
     let choice = choose(&DeviceRequest::Name("llvmpipe".to_owned()), &devices)
         .unwrap_or_else(|error| panic!("tests run on software Vulkan; install mesa-vulkan-drivers: {error}"));
     let Choice::Vulkan(index) = choice else { panic!("a device asked for by name is a Vulkan device") };
-    let staging = if is_staging_forced() { Staging::Forced } else { options.staging };
-    let options = DeviceOptions { staging, ..options.clone() };
     let mut info = devices[index].clone();
     change(&mut info);
-    let device = Device::create(&instance, &info, &options).expect("software Vulkan can be opened");
-    assert_eq!(device.staging(), staging);
+    let device = Device::create(&instance, &info, options).expect("software Vulkan can be opened");
     let alive = Arc::downgrade(&device);
 
     let result = test(device);
@@ -56,15 +51,6 @@ pub fn with_device<T>(options: &DeviceOptions, test: impl FnOnce(Arc<Device>) ->
     let (result, messages) = watch(options, test);
     assert!(messages.is_empty(), "the validation layer complains:\n{}", messages.join("\n"));
     result
-}
-
-/// Whether the environment sends every test through staging.
-fn is_staging_forced() -> bool {
-    match std::env::var("SMALTI_TEST_STAGING").as_deref() {
-        Err(_) => false,
-        Ok("forced") => true,
-        Ok(other) => panic!("SMALTI_TEST_STAGING is {other}; it can only be `forced`"),
-    }
 }
 
 /// Without this a driver that ignores the variable would make the second run of the suite a mere repetition.
