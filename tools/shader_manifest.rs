@@ -13,7 +13,7 @@ use sha2::{Digest, Sha256};
 pub const OPTIONS: &str = "target=vulkan1.3 optimization=none warnings=errors";
 
 /// The shader stages, as named in `glsl/`; the module of `evaluate.comp` is `spirv/evaluate.comp.spv`.
-pub const STAGES: [&str; 14] = [
+pub const STAGES: [&str; 15] = [
     "cells.comp",
     "cells_deal.comp",
     "cells_depths.comp",
@@ -22,6 +22,7 @@ pub const STAGES: [&str; 14] = [
     "cells_scan.comp",
     "cells_scatter.comp",
     "cells_sort.comp",
+    "cells_spread.comp",
     "compose.comp",
     "evaluate.comp",
     "mosaic.frag",

@@ -50,6 +50,8 @@ pub(super) const CELLS_SCAN: &[u8] = include_bytes!("../../spirv/cells_scan.comp
 pub(super) const CELLS_SCATTER: &[u8] = include_bytes!("../../spirv/cells_scatter.comp.spv");
 /// Twin: `renormalise` in `cpu/cells/mod.rs`.
 pub(super) const CELLS_DEPTHS: &[u8] = include_bytes!("../../spirv/cells_depths.comp.spv");
+/// Twin: `model/cells/depths.rs`.
+pub(super) const CELLS_SPREAD: &[u8] = include_bytes!("../../spirv/cells_spread.comp.spv");
 /// Slices in the order of the flies.
 pub(super) const CELLS_SORT: &[u8] = include_bytes!("../../spirv/cells_sort.comp.spv");
 

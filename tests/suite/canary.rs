@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use smalti::vk::{
-    Choice, Device, DeviceInfo, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, choose,
+    Choice, Device, DeviceInfo, DeviceKind, DeviceOptions, DeviceRequest, Instance, InstanceOptions, Validation, choose,
 };
 
 /// Runs `test` on a fresh device, drops everything, and returns what the validation layer said.
@@ -49,6 +49,13 @@ pub fn watch_changed<T>(
 /// Runs `test` on a fresh device and fails if the validation layer says anything at all.
 pub fn with_device<T>(options: &DeviceOptions, test: impl FnOnce(Arc<Device>) -> T) -> T {
     let (result, messages) = watch(options, test);
+    assert!(messages.is_empty(), "the validation layer complains:\n{}", messages.join("\n"));
+    result
+}
+
+/// As [`with_device`], on a device that is taken for a graphics card.
+pub fn with_hardware<T>(test: impl FnOnce(Arc<Device>) -> T) -> T {
+    let (result, messages) = watch_changed(&DeviceOptions::default(), |info| info.kind = DeviceKind::Discrete, test);
     assert!(messages.is_empty(), "the validation layer complains:\n{}", messages.join("\n"));
     result
 }

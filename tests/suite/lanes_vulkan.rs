@@ -66,25 +66,33 @@ fn finish(lanes: &mut VulkanLanes, mut busy: Vec<usize>) {
 
 #[test]
 fn lanes_of_all_styles_and_sizes_come_to_the_twins_state_side_by_side() {
+    canary::with_device(&DeviceOptions::default(), |device| all_side_by_side(&device));
+}
+
+/// Hardware spreads depths itself, and its submissions follow the time that they take.
+#[test]
+fn lanes_of_hardware_come_to_the_twins_state_side_by_side() {
+    canary::with_hardware(|device| all_side_by_side(&device));
+}
+
+fn all_side_by_side(device: &Arc<Device>) {
     let all = mixed_courses();
-    canary::with_device(&DeviceOptions::default(), |device| {
-        let mut lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
-        let wide = CellShape { lanes: 32, form: CellForm::Wide, budget: 60_000 };
-        let shape = |place: usize| if place % 3 == 1 { wide } else { narrow(&device) };
-        let taken: Vec<usize> =
-            all.iter().enumerate().map(|(place, (_, course))| admit(&mut lanes, course, shape(place))).collect();
-        for rounds in [2, 4] {
-            for &lane in &taken {
-                lanes.ask(lane, 2).expect("the device works");
-            }
-            finish(&mut lanes, taken.clone());
-            for ((name, course), &lane) in all.iter().zip(&taken) {
-                let mut twin = twin_after(course, rounds, 2);
-                let mut lane = OneLane { lanes: &mut lanes, lane };
-                check_equal(&mut twin, &mut lane, &format!("{name} after {rounds} rounds"));
-            }
+    let mut lanes = VulkanLanes::create(device, Timing::Off).expect("the device works");
+    let wide = CellShape { lanes: 32, form: CellForm::Wide, budget: 60_000 };
+    let shape = |place: usize| if place % 3 == 1 { wide } else { narrow(device) };
+    let taken: Vec<usize> =
+        all.iter().enumerate().map(|(place, (_, course))| admit(&mut lanes, course, shape(place))).collect();
+    for rounds in [2, 4] {
+        for &lane in &taken {
+            lanes.ask(lane, 2).expect("the device works");
         }
-    });
+        finish(&mut lanes, taken.clone());
+        for ((name, course), &lane) in all.iter().zip(&taken) {
+            let mut twin = twin_after(course, rounds, 2);
+            let mut lane = OneLane { lanes: &mut lanes, lane };
+            check_equal(&mut twin, &mut lane, &format!("{name} after {rounds} rounds"));
+        }
+    }
 }
 
 /// Lanes of a small budget, so that a submission ends in the middle of a round.
@@ -119,6 +127,33 @@ fn refill_mid_round(device: &Arc<Device>) {
 #[test]
 fn lanes_that_are_refilled_while_others_are_in_mid_round_disturb_nobody() {
     canary::with_device(&DeviceOptions::default(), |device| refill_mid_round(&device));
+}
+
+/// Depths that a device is still to spread must not be those of whoever comes next to the same place.
+#[test]
+fn lanes_that_come_and_go_after_hardware_was_to_spread_depths_disturb_nobody() {
+    canary::with_hardware(|device| {
+        let shape = narrow(&device);
+        let all = mixed_courses();
+        let mut lanes = VulkanLanes::create(&device, Timing::Off).expect("the device works");
+        for pair in all.chunks_exact(2).take(6) {
+            let taken: Vec<usize> = pair.iter().map(|(_, course)| admit(&mut lanes, course, shape)).collect();
+            taken.iter().for_each(|&lane| lanes.ask(lane, 2).expect("the device works"));
+            finish(&mut lanes, taken.clone());
+            // Nothing was submitted since. One lane leaves, another one goes on.
+            lanes.dismiss(taken[0]);
+            let next = admit(&mut lanes, &pair[0].1, shape);
+            for lane in [next, taken[1]] {
+                lanes.ask(lane, 2).expect("the device works");
+            }
+            finish(&mut lanes, vec![next, taken[1]]);
+            for (lane, (name, course), rounds) in [(next, &pair[0], 2), (taken[1], &pair[1], 4)] {
+                let mut twin = twin_after(course, rounds, 2);
+                check_equal(&mut twin, &mut OneLane { lanes: &mut lanes, lane }, name);
+                lanes.dismiss(lane);
+            }
+        }
+    });
 }
 
 #[test]

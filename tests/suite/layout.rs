@@ -57,7 +57,7 @@ fn kind_of<T, F: Kind>(_field: impl Fn(&T) -> &F) -> String {
 }
 
 /// The stages of a search.
-const CELLS: [&str; 8] = [
+const CELLS: [&str; 9] = [
     "cells.comp",
     "cells_deal.comp",
     "cells_depths.comp",
@@ -66,6 +66,7 @@ const CELLS: [&str; 8] = [
     "cells_scan.comp",
     "cells_scatter.comp",
     "cells_sort.comp",
+    "cells_spread.comp",
 ];
 
 /// `Type = "Struct" in place of stages, { field = "member", ... }`.

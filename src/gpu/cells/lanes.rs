@@ -4,12 +4,11 @@
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 
-use super::buffers::{self, LaneSlices, POOLS, Part, SearchBuffers};
+use super::buffers::{self, LaneSlices, POOLS, Part, Pool, SearchBuffers};
 use super::lane::Lane;
 use super::layout::{FlyRecord, SearchHeader};
-use super::pass::{CellsPart, CellsPass, LaneSize, OldDepths, Team, Variant};
+use super::pass::{CellsPart, CellsPass, LaneSize, Placed, Team, Variant};
 use super::plan::{PIXEL_WORDS, Plan};
 use super::shape::CellShape;
 use super::state;
@@ -17,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::gpu::pace::Pace;
 use crate::gpu::pools::{BufferRange, Growth, Needs};
 use crate::model::Fly;
-use crate::model::cells::{Course, Search, SearchLanes, SearchState, Stacks, Standing, depths};
+use crate::model::cells::{Course, Search, SearchLanes, SearchState, Stacks, Standing};
 use crate::vk::{Device, DeviceKind, PassTime, ReadTicket, Recorder, Timing};
 
 /// Most iterations of a submission to software Vulkan, which runs the lanes of a dispatch one after the other: all
@@ -40,14 +39,14 @@ const EVALS_BETWEEN_MARKS: u64 = 20_000;
 pub struct VulkanLanes {
     pub(super) device: Arc<Device>,
     pub(super) recorder: Recorder,
-    pass: CellsPass,
+    pub(super) pass: CellsPass,
     kins: Vec<Kin>,
     /// Kins so far, those that are gone included.
     kin_count: u64,
     /// By number, without those that are free.
     pub(super) lanes: Vec<Option<Lane>>,
     /// Whether the rules on the device and the stages of the pass are those of the lanes.
-    is_arranged: bool,
+    pub(super) is_arranged: bool,
     /// Of an iteration that takes several submissions, where the next one begins: cell and lane; zeros between
     /// iterations.
     next: (u32, u32),
@@ -55,6 +54,9 @@ pub struct VulkanLanes {
     pace: Pace,
     /// Cells of the submission at hand.
     recorded: u64,
+    /// Whether passes are recorded that work on lanes where they lie now, by the rules that are on the device. What is
+    /// written to a lane or to the rules would reach the device before them.
+    pub(super) is_spreading: bool,
 }
 
 /// Lanes of one variant, all or as many as buffers can hold. They share buffers that no other lanes use, so that
@@ -86,6 +88,7 @@ impl VulkanLanes {
             next: (0, 0),
             pace: Pace::for_kind(device.info().kind, CELLS_FIRST),
             recorded: 0,
+            is_spreading: false,
         })
     }
 
@@ -119,6 +122,7 @@ impl VulkanLanes {
 
     /// Finds room for a lane among those of its variant, or in buffers of its own. Returns the number of its kin, too.
     fn take_slices(&mut self, variant: Variant, needs: &Needs<'_, POOLS>) -> Result<Option<(u64, LaneSlices)>> {
+        self.flush()?;
         self.pass.disband();
         self.is_arranged = false;
         for place in 0..self.kins.len() {
@@ -200,7 +204,8 @@ impl VulkanLanes {
     }
 
     /// Puts the rules of all lanes on the device.
-    fn arrange(&mut self) -> Result<()> {
+    pub(super) fn arrange(&mut self) -> Result<()> {
+        self.flush()?;
         let numbers = self.numbers();
         let mut teams = Vec::new();
         for place in 0..self.kins.len() {
@@ -242,17 +247,7 @@ impl VulkanLanes {
         if !self.is_arranged {
             self.arrange()?;
         }
-        let mut with_old_depths = Vec::new();
-        for place in 0..self.kins.len() {
-            let group = self.kins[place].buffers.bind(self.pass.any_pipeline())?;
-            for (first_lane, &number) in (0..).zip(&self.kins[place].order) {
-                let lane = self.lane(number);
-                if lane.has_old_depths {
-                    let block_count = lane.plan.block_count() as u32;
-                    with_old_depths.push(OldDepths { group: Arc::clone(&group), first_lane, block_count });
-                }
-            }
-        }
+        let with_old_depths = self.placed(|_, lane| lane.has_old_depths.then_some(lane.plan.block_count() as u32))?;
         self.pass.record_depths(&mut self.recorder, &with_old_depths)?;
         self.keep_marks(busy)?;
         let (cells, lanes) = self.pass.cells();
@@ -287,6 +282,20 @@ impl VulkanLanes {
             (_, false) => (cell, end),
         };
         CellsPart { cells: cell..cell + 1, lanes: lane..end }
+    }
+
+    /// The lanes that need workgroups, with how many, by number and lane.
+    pub(super) fn placed(&mut self, workgroups: impl Fn(usize, &Lane) -> Option<u32>) -> Result<Vec<Placed>> {
+        let mut placed = Vec::new();
+        for place in 0..self.kins.len() {
+            let group = self.kins[place].buffers.bind(self.pass.any_pipeline())?;
+            for (first_lane, &number) in (0..).zip(&self.kins[place].order) {
+                if let Some(workgroups) = workgroups(number, self.lane(number)) {
+                    placed.push(Placed { group: Arc::clone(&group), first_lane, workgroups });
+                }
+            }
+        }
+        Ok(placed)
     }
 
     pub(super) fn read_fly_records(&mut self, lanes: &[usize]) -> Result<Vec<Vec<FlyRecord>>> {
@@ -370,15 +379,23 @@ impl SearchLanes for VulkanLanes {
             return Ok(());
         }
         self.record(&busy)?;
-        let tickets = busy.iter().map(|&number| self.ask_for(number, Part::Header)).collect::<Result<Vec<_>>>()?;
-        self.recorder.submit_and_wait()?;
-        self.pace.note(self.recorded, self.recorder.took());
-        for lane in self.lanes.iter_mut().flatten() {
-            lane.has_old_depths = false;
+        // The headers of a kin lie side by side, so one copy brings them all.
+        let mut tickets = Vec::with_capacity(self.kins.len());
+        for Kin { number, buffers, .. } in &self.kins {
+            let headers = buffers.part(Part::Header);
+            tickets.push((*number, self.recorder.read_buffer(headers, 0, headers.size_bytes())?));
         }
-        for (number, ticket) in busy.into_iter().zip(tickets) {
-            let header = self.take::<SearchHeader>(&ticket)?[0];
-            self.lane_mut(number).absorb(&header);
+        self.recorder.submit_and_wait()?;
+        self.is_spreading = false;
+        self.pace.note(self.recorded, self.recorder.took());
+        for (kin, ticket) in tickets {
+            let headers = self.take::<SearchHeader>(&ticket)?;
+            for lane in self.lanes.iter_mut().flatten().filter(|lane| lane.kin == kin) {
+                lane.has_old_depths = false;
+                if lane.is_busy() {
+                    lane.absorb(&headers[lane.slices.first(Pool::Lanes) as usize]);
+                }
+            }
         }
         if !self.lanes.iter().flatten().any(Lane::is_busy) {
             self.next = (0, 0);
@@ -391,17 +408,7 @@ impl SearchLanes for VulkanLanes {
     }
 
     fn renormalise(&mut self, lanes: &[usize]) -> Result<()> {
-        let mut records = self.read_fly_records(lanes)?;
-        records.par_iter_mut().for_each(|records| {
-            let mut flies: Vec<Fly> = records.iter().map(FlyRecord::fly).collect();
-            depths::spread(&mut flies);
-            records.iter_mut().zip(&flies).for_each(|(record, fly)| record.z = fly.z);
-        });
-        for (&lane, records) in lanes.iter().zip(&records) {
-            self.write(lane, Part::Flies, bytemuck::cast_slice(records))?;
-            self.lane_mut(lane).has_old_depths = true;
-        }
-        Ok(())
+        self.spread_depths(lanes)
     }
 
     fn read_back(&mut self, lane: usize) -> Result<SearchState> {

@@ -14,6 +14,7 @@ use crate::model::cells::{Search, SearchState, Standing};
 impl VulkanLanes {
     /// Writes the state that a lane begins with.
     pub(super) fn begin(&mut self, number: usize, first: Option<&[Fly]>) -> Result<()> {
+        self.flush()?;
         let lane = self.lane(number);
         let course = lane.course.clone();
         self.write(number, Part::Guide, bytemuck::cast_slice(&course.guide.samples))?;

@@ -1,6 +1,7 @@
 //! The `cells` search on a Vulkan device. Twin: `cpu/cells/`, with the stages `glsl/cells*.comp`.
 
 mod buffers;
+mod depths;
 mod lane;
 pub(super) mod lanes;
 pub mod layout;

@@ -19,6 +19,8 @@ use crate::vk::{BindingGroup, BindingKind, ComputePass, ComputePipeline, Compute
 
 /// Invocations of a workgroup of the passes that work fly by fly or pixel by pixel.
 const ITEMS_PER_GROUP: u64 = 64;
+/// Flies of a workgroup of the passes that spread depths.
+pub(super) const FLIES_PER_SPREAD: u32 = 256;
 
 /// What the steps of cells are compiled for. Lanes with the same variant share their dispatches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -75,12 +77,13 @@ impl LaneSize {
     }
 }
 
-/// A lane whose pixels hold depths that are out of date.
-pub(super) struct OldDepths {
+/// A lane among those that share its buffers.
+pub(super) struct Placed {
     pub group: Arc<BindingGroup>,
     /// Its place in the order of rules.
     pub first_lane: u32,
-    pub block_count: u32,
+    /// Workgroups that it needs.
+    pub workgroups: u32,
 }
 
 impl Team {
@@ -187,6 +190,8 @@ pub(super) struct CellsPass {
     /// Deal, scan, scatter and sort.
     dealing: [Arc<ComputePipeline>; 4],
     depths: Arc<ComputePipeline>,
+    /// One finds new depths, and the other takes them.
+    spread: [Arc<ComputePipeline>; 2],
     steps: Vec<Steps>,
     stages: Vec<Stage>,
 }
@@ -203,6 +208,10 @@ impl CellsPass {
                 create("cells_sort", shaders::CELLS_SORT)?,
             ],
             depths: create("cells_depths", shaders::CELLS_DEPTHS)?,
+            spread: [
+                create_pipeline(device, "cells_spread", shaders::CELLS_SPREAD, &[(9, 0)])?,
+                create_pipeline(device, "cells_spread", shaders::CELLS_SPREAD, &[(9, 1)])?,
+            ],
             steps: Vec::new(),
             stages: Vec::new(),
         })
@@ -258,19 +267,34 @@ impl CellsPass {
         Ok(&self.steps[place.unwrap_or(self.steps.len() - 1)])
     }
 
-    /// Records the pass that brings the depths of pixels up to date.
-    pub fn record_depths(&self, recorder: &mut Recorder, lanes: &[OldDepths]) -> Result<()> {
+    /// Records the pass that brings the depths of pixels up to date; a workgroup is a block of pixels.
+    pub fn record_depths(&self, recorder: &mut Recorder, lanes: &[Placed]) -> Result<()> {
+        self.record_for(recorder, "cells_depths", &self.depths, lanes)
+    }
+
+    /// Records the passes that spread the depths of flies evenly.
+    pub fn record_spread(&self, recorder: &mut Recorder, lanes: &[Placed]) -> Result<()> {
+        self.spread.iter().try_for_each(|pipeline| self.record_for(recorder, "cells_spread", pipeline, lanes))
+    }
+
+    fn record_for(
+        &self,
+        recorder: &mut Recorder,
+        name: &'static str,
+        pipeline: &Arc<ComputePipeline>,
+        lanes: &[Placed],
+    ) -> Result<()> {
         if lanes.is_empty() {
             return Ok(());
         }
-        let mut pass = recorder.compute_pass("cells_depths")?;
-        for OldDepths { group, first_lane, block_count } in lanes {
+        let mut pass = recorder.compute_pass(name)?;
+        for Placed { group, first_lane, workgroups } in lanes {
             let dispatch = Dispatch {
-                pipeline: Arc::clone(&self.depths),
+                pipeline: Arc::clone(pipeline),
                 group: Arc::clone(group),
                 push: CellsPush { first_lane: *first_lane, budget: 0, first_cell: 0 },
                 lanes: 1,
-                workgroups: *block_count,
+                workgroups: *workgroups,
             };
             self.dispatch(&mut pass, &dispatch);
         }
