@@ -155,7 +155,7 @@ uvec3 median_halves(uint table, uint rank, inout uvec3 below) {
     return found;
 }
 
-// As `median_color`, half a byte at a time: for several subgroups, which pay for each pass with a barrier.
+// As `median_color`, half a byte at a time.
 uint median_by_halves(uint weight, uint own_count) {
     uint rank = (weight - 1u) / 2u;
     // The table of the upper halves was cleared before the last barrier.
@@ -167,7 +167,7 @@ uint median_by_halves(uint weight, uint own_count) {
         }
     }
     clear_weights(1u);
-    barrier();
+    sync_shared();
     uvec3 below = uvec3(0u);
     uvec3 upper = median_halves(0u, rank, below);
     for (uint place = 0u; place < own_count; ++place) {
@@ -180,7 +180,7 @@ uint median_by_halves(uint weight, uint own_count) {
             }
         }
     }
-    barrier();
+    sync_shared();
     uvec3 median = upper << 4 | median_halves(1u, rank, below);
     // Read for the last time before that barrier.
     clear_weights(0u);
@@ -189,7 +189,7 @@ uint median_by_halves(uint weight, uint own_count) {
 
 // The weighted medians of the channels in the scratch, bit by bit. Twin: src/model/cells/color.rs.
 uint median_color(uint weight, uint own_count) {
-    if (WIDE == 1u) {
+    if (BY_HALVES == 1u) {
         return median_by_halves(weight, own_count);
     }
     int rank = int(weight - 1u) / 2;
@@ -440,7 +440,7 @@ void settle_fitness(uint index, Fly old, Fly child, int change) {
 
 // The table of the upper halves is clear between medians.
 void begin_stage() {
-    if (WIDE == 1u) {
+    if (BY_HALVES == 1u) {
         clear_weights(0u);
     }
 }

@@ -124,7 +124,7 @@ impl EvaluatePass {
             return Ok(());
         }
         let larger = |needed: usize, capacity: usize, bytes: usize| {
-            let limit = self.device.info().limits.storage_buffer_bytes as usize / bytes;
+            let limit = self.device.info().limits.largest_storage_buffer_bytes() as usize / bytes;
             if needed <= capacity { capacity } else { needed.max(2 * capacity).min(limit) }
         };
         let items = larger(items, self.item_capacity(), size_of::<WorkItem>());

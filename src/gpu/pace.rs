@@ -18,17 +18,20 @@ const SHORTEST: Duration = Duration::from_millis(50);
 pub(super) struct Pace {
     units: u64,
     most: u64,
+    /// Whether it follows the time.
+    is_measured: bool,
 }
 
 impl Pace {
     /// Begins with so many units, and never takes more than `most`.
     pub fn new(first: u64, most: u64) -> Self {
-        Self { units: first.clamp(1, most), most }
+        Self { units: first.clamp(1, most), most, is_measured: true }
     }
 
     /// As [`Pace::new`] for hardware. Software Vulkan has no watchdog: there a submission takes what it is given.
     pub fn for_kind(kind: DeviceKind, first: u64) -> Self {
-        Self::new(if kind == DeviceKind::Cpu { u64::MAX } else { first }, u64::MAX)
+        let is_measured = kind != DeviceKind::Cpu;
+        Self { is_measured, ..Self::new(if is_measured { first } else { u64::MAX }, u64::MAX) }
     }
 
     /// The most units of the next submission.
@@ -36,8 +39,11 @@ impl Pace {
         self.units
     }
 
-    /// Learns from a submission of so many units.
+    /// Learns from a submission of so many units, and of nothing else.
     pub fn note(&mut self, units: u64, took: Duration) {
+        if units == 0 || !self.is_measured {
+            return;
+        }
         if took > LONGEST {
             let share = AIM.as_secs_f64() / took.as_secs_f64();
             // Less than it had, whatever is rounded.
@@ -94,11 +100,15 @@ mod tests {
         assert_eq!(pace.units(), 100);
         pace.note(10, ms(400));
         assert_eq!(pace.units(), 2, "but for one that was too long");
+        pace.note(0, ms(400));
+        assert_eq!(pace.units(), 2, "and one that had nothing to do");
     }
 
     #[test]
     fn software_takes_what_it_is_given() {
-        assert_eq!(Pace::for_kind(DeviceKind::Cpu, 5).units(), u64::MAX);
+        let mut software = Pace::for_kind(DeviceKind::Cpu, 5);
+        software.note(1_000, ms(9_000));
+        assert_eq!(software.units(), u64::MAX);
         assert_eq!(Pace::for_kind(DeviceKind::Integrated, 5).units(), 5);
     }
 }

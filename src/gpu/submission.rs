@@ -141,7 +141,9 @@ impl GpuEvaluator {
         let sums_ticket =
             if tickets.is_empty() { None } else { Some(recorder.read_buffer(sums, 0, sums.size_bytes())?) };
         recorder.submit_and_wait()?;
-        self.pace.note(work.items.len() as u64, recorder.took());
+        if parts.is_none() {
+            self.pace.note(work.items.len() as u64, recorder.took());
+        }
         if let (Some(translucent), Some(parts)) = (&mut self.translucent, parts) {
             translucent.absorb(recorder, &parts)?;
         }

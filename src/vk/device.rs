@@ -153,9 +153,12 @@ impl Device {
         self.staging
     }
 
-    /// The compiled pipelines, which the next start can reuse; empty if the driver returns none.
+    /// The compiled pipelines, which the next start can reuse; empty if the driver returns none, or never answered.
     #[must_use]
     pub fn pipeline_cache_bytes(&self) -> Vec<u8> {
+        if self.is_given_up() {
+            return Vec::new();
+        }
         // SAFETY: V1.
         unsafe { self.raw().get_pipeline_cache_data(self.pipeline_cache) }.unwrap_or_default()
     }

@@ -6,7 +6,8 @@
 //!   order, so a parent outlives its children. A pointer handed to Vulkan points to something that lives until the call
 //!   returns. Objects of different devices never meet: a process works with one device at a time.
 //! - **V2 idle.** Nothing that the device may still use is destroyed: a [`Recorder`] keeps what its commands name until
-//!   their fence has been waited for, and a failed wait is followed by a wait for the idle queue.
+//!   their fence has been waited for, and a failed wait is followed by a wait for the idle queue. A device that does
+//!   not answer is given up: nothing of it is destroyed, recorded or submitted any more.
 //! - **V3 recording.** `&mut Recorder` is the only way to record; a pass borrows it and ends in `Drop`. The queue is
 //!   behind a lock.
 //! - **V4 layout.** Bytes that cross to a shader are plain data laid out by the caller and checked here for length;

@@ -12,6 +12,7 @@ use ash::vk;
 
 use super::commands::{
     allocate_command_buffers, begin_commands, create_command_pool, create_fence, end_commands, record_barrier,
+    submission_failed,
 };
 use super::handle::Owned;
 use super::scope::Scope;
@@ -203,6 +204,9 @@ impl Recorder {
     pub(super) fn begin(&mut self) -> Result<()> {
         if self.is_recording {
             return Ok(());
+        }
+        if self.device.is_given_up() {
+            return Err(submission_failed("vkResetCommandPool", vk::Result::ERROR_DEVICE_LOST, self.last_pass));
         }
         // SAFETY: V1, V2, V3.
         unsafe { self.device.raw().reset_command_pool(self.pool.get(), vk::CommandPoolResetFlags::empty()) }

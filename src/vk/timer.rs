@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::commands::submission_failed;
 use super::handle::Owned;
 use super::{Device, call_failed};
 use crate::error::Result;
@@ -121,7 +122,7 @@ impl Timer {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: V1, V2; every query asked for was written.
         unsafe { device.raw().get_query_pool_results(self.pool.get(), first, &mut self.ticks, flags) }
-            .map_err(|result| call_failed("vkGetQueryPoolResults", result))?;
+            .map_err(|result| submission_failed("vkGetQueryPoolResults", result, names[names.len() - 1]))?;
         let limits = &device.info().limits;
         let times = names.iter().zip(self.ticks.chunks_exact(2));
         self.times.extend(times.map(|(&name, pair)| PassTime {

@@ -56,12 +56,17 @@ impl Checked {
 /// Makes all checks. One that the device fails stops no other, unless the device is lost: then it is the last one.
 ///
 /// # Errors
-/// If the CPU fails.
-pub(crate) fn run_all(device: &Device, mut progress: Progress) -> Result<Vec<Checked>> {
+/// If the CPU fails, or `goes_on` says so.
+pub(crate) fn run_all(
+    device: &Device,
+    mut progress: Progress,
+    goes_on: impl Fn() -> Result<()>,
+) -> Result<Vec<Checked>> {
     let (twin, began) = (Device::cpu(), Instant::now());
     let trials = trials::all()?;
     let mut checks = Vec::with_capacity(trials.len());
     for trial in &trials {
+        goes_on()?;
         let why = if trial.needs_graphics { why_the_cpu_draws(device.missing_for_drawing()) } else { None };
         let (checked, is_lost) = match why {
             Some(why) => (Checked::skipped(&trial.name, why), false),

@@ -7,7 +7,7 @@ use indicatif::HumanCount;
 use serde::Serialize;
 
 use crate::cli::args::computing::{Computing, ComputingArgs};
-use crate::cli::checks::{Checked, Outcome, run_all};
+use crate::cli::checks::{self, Checked, Outcome};
 use crate::cli::terminal::progress::{Progress, ProgressKind};
 use crate::cli::terminal::{self, Verbosity, words};
 use crate::error::{Error, NoDevice, Result};
@@ -84,7 +84,7 @@ fn try_check(args: &CheckArgs) -> Result<bool> {
     computing.start_threads()?;
     let device = the_device_itself(&computing)?;
     let progress = Progress::new(args.progress.unless(args.quiet), verbosity);
-    let checks = run_all(&device, progress)?;
+    let checks = checks::run_all(&device, progress, || Ok(()))?;
     let report = Report {
         schema: "smalti-check",
         schema_version: 1,

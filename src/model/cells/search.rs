@@ -218,7 +218,7 @@ pub trait SearchLanes: Send {
     /// If the device fails.
     fn mark(&mut self, lane: usize) -> Result<()>;
 
-    /// Takes a lane back to where it was marked; it is not busy then.
+    /// Takes a lane back to where it was marked, or to where a later round ended; it is not busy then.
     ///
     /// # Errors
     /// If the device fails.

@@ -165,15 +165,17 @@ impl SearchLanes for LanesOrTwins {
     }
 
     fn cut(&mut self, lane: usize) -> Result<()> {
+        let is_lost = self.device.is_none();
         let account = self.account_mut(lane);
-        let has_moved = account.ahead > 0 || account.done.len() > account.marked;
+        if is_lost {
+            // The twin has made whole rounds and is not taken back: any round will do.
+            account.left = 0;
+            account.settle();
+            return Ok(());
+        }
         account.done.truncate(account.marked);
         account.left = 0;
-        let had_twin = self.device.is_none();
-        if self.on_device(|device| device.cut(lane))?.is_none() && had_twin && has_moved {
-            self.account_mut(lane).repeat()?;
-        }
-        Ok(())
+        self.on_device(|device| device.cut(lane)).map(|_| ())
     }
 
     fn rounds_between_marks(&self, lane: usize) -> u32 {

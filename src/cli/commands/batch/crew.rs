@@ -126,7 +126,10 @@ impl<'a, 'p> Crew<'a, 'p> {
         if picture.work.options.settings.time_limit.is_some() {
             // A picture with a time limit evolves alone: with neighbours, the clock would decide even more of its
             // result.
-            self.pipeline.evolve_one(self.device, None, picture, &self.outlets);
+            if let Some((picture, error)) = self.pipeline.evolve_one(self.device, None, picture, &self.outlets) {
+                self.held = Some(picture);
+                return Err(error);
+            }
             return Ok(Admitted::Aboard);
         }
         picture.row.device = Some(self.device.label().to_owned());
@@ -153,8 +156,7 @@ impl<'a, 'p> Crew<'a, 'p> {
             Err(error) => {
                 let warning = format!("{}: on the CPU, since {}", picture.item.input.display(), why_no_vulkan(&error));
                 let _ = self.outlets.reports.send(Report::Warning(warning));
-                let on_cpu = Device::cpu();
-                self.pipeline.evolve_one(&on_cpu, None, picture, &self.outlets);
+                self.pipeline.evolve_on_cpu(None, picture, &self.outlets);
                 Ok(Admitted::Aboard)
             }
         }
@@ -251,7 +253,7 @@ impl<'a, 'p> Crew<'a, 'p> {
         self.held = None;
         self.pipeline.schedule.end();
         // Threads that read may be waiting for room.
-        while queue.take().is_some() {}
+        while queue.take_or(|| self.outlets.orphans.take()).is_some() {}
         self.outlets.orphans.quit();
     }
 }

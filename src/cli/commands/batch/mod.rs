@@ -26,7 +26,7 @@ use self::places::Taken;
 use self::schedule::Schedule;
 use self::stages::{Pipeline, Report};
 use self::summary::Summary;
-use crate::cli::args::computing;
+use crate::cli::args::computing::{self, Computing};
 use crate::cli::args::typed::Typed;
 use crate::cli::checks::{self, Checked};
 use crate::cli::files::destination::Overwrite;
@@ -111,7 +111,7 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
         workers.iter().for_each(|worker| computing::say_device(&worker.device));
     }
     if args.check {
-        workers.iter().try_for_each(|worker| check(&worker.device, args))?;
+        workers.iter().try_for_each(|worker| check(&worker.device, &computing, &interrupt, args))?;
     }
     workers.iter().for_each(|worker| trace::trace_device(&tracer, &worker.device));
     let pipeline = Pipeline {
@@ -142,23 +142,25 @@ fn run(args: &BatchArgs, typed: &Typed) -> Result<u8> {
 }
 
 /// Ends the batch before it begins if a device does not give what the CPU gives.
-fn check(device: &Device, args: &BatchArgs) -> Result<()> {
+fn check(device: &Device, computing: &Computing, interrupt: &Interrupt, args: &BatchArgs) -> Result<()> {
     if device.is_cpu() {
         return Ok(());
     }
     let progress = Progress::new(args.messages.progress.unless(args.messages.quiet), args.messages.verbosity());
-    let made = checks::run_all(device, progress)?;
+    let uuid = device.vulkan().map(|vulkan| vulkan.info().uuid.clone()).unwrap_or_default();
+    let itself = computing.of(format!("uuid:{uuid}").parse()?).select_itself()?;
+    let made = checks::run_all(&itself, progress, || interrupt.check())?;
     let wrong: Vec<&Checked> = made.iter().filter(|check| check.outcome.is_wrong()).collect();
     let Some(first) = wrong.first() else { return Ok(()) };
     let detail = first.detail.as_deref().unwrap_or("it is different");
-    Err(Error::Usage(format!(
-        "--check: {} does not give what the CPU gives in {} of {} checks ({}: {detail}); use --device cpu, and see \
-         smalti check",
-        device.label(),
+    let reason = format!(
+        "{} of {} checks did not come out equal ({}: {detail}); do without this device, as with --device cpu, and \
+         report what smalti check prints",
         wrong.len(),
         made.len(),
         first.name
-    )))
+    );
+    Err(Error::Vulkan { call: format!("--check of {}", device.label()), reason })
 }
 
 /// Says how many outputs are there already, and what becomes of them.

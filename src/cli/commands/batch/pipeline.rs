@@ -76,7 +76,6 @@ impl<'a> Pipeline<'a> {
         let evolve = |(worker, crew): (&'a Worker, Hands<'a>)| {
             let ready = Arc::clone(&ready_out);
             let outlets = Outlets { done: done_in.clone(), reports: reports.clone(), orphans: Arc::clone(&orphans) };
-            orphans.enter();
             let evolve = move || self.evolve_all(&worker.device, crew, &ready, &outlets);
             let spawned = threads::spawn_in(scope, evolve).map(drop);
             if spawned.is_err() {
@@ -88,8 +87,13 @@ impl<'a> Pipeline<'a> {
             let (ready, reports) = (ready_in.clone(), reports.clone());
             threads::spawn_in(scope, move || self.read_all(&ready, &reports)).map(drop)
         };
-        let mut crews =
-            self.workers.iter().flat_map(|worker| worker.crews().into_iter().map(move |crew| (worker, crew)));
+        let crews: Vec<_> = self
+            .workers
+            .iter()
+            .flat_map(|worker| worker.crews().into_iter().map(move |crew| (worker, crew)))
+            .inspect(|_| orphans.enter())
+            .collect();
+        let mut crews = crews.into_iter();
         // One of each must start; where the system has no room for the others, these do their work, too.
         if let Err(error) = save().and_then(|()| crews.next().map_or(Ok(()), evolve)).and_then(|()| read()) {
             self.schedule.end();
@@ -97,6 +101,7 @@ impl<'a> Pipeline<'a> {
             return received;
         }
         let _ = crews.try_for_each(evolve);
+        crews.for_each(|_| orphans.quit());
         let _ = (1..self.io_threads.save).try_for_each(|_| save());
         let _ = (1..self.io_threads.load).try_for_each(|_| read());
         received
@@ -177,9 +182,9 @@ impl<'a> Pipeline<'a> {
     fn evolve_all(&self, device: &Device, hands: Hands<'_>, ready: &Queue<Ready<'a>>, outlets: &Outlets<'a>) {
         let _quits = QuitsInPanic(&outlets.orphans);
         let reports = &outlets.reports;
-        let on_cpu = Device::cpu();
-        let (device, pool) = match hands {
-            Hands::Pool(pool) => (device, Some(pool)),
+        // Whoever has no crew computes on the CPU.
+        let pool = match hands {
+            Hands::Pool(pool) => Some(pool),
             Hands::Lanes(in_flight) => match Crew::muster(self, device, in_flight, outlets.clone()) {
                 Ok(Some(mut crew)) => {
                     let left = crew.work(ready);
@@ -187,15 +192,15 @@ impl<'a> Pipeline<'a> {
                         return;
                     }
                     drop(crew);
-                    left.into_iter().for_each(|picture| self.evolve_one(&on_cpu, None, picture, outlets));
-                    (&on_cpu, None)
+                    left.into_iter().for_each(|picture| self.evolve_on_cpu(None, picture, outlets));
+                    None
                 }
-                Ok(None) => (device, None),
+                Ok(None) => None,
                 // The user did not name this device, so the CPU may replace it: the bytes are the same.
                 Err(error) if !device.is_asked_for() => {
                     let _ =
                         reports.send(Report::Warning(format!("computing on the CPU, since {}", why_no_vulkan(&error))));
-                    (&on_cpu, None)
+                    None
                 }
                 Err(error) => {
                     outlets.orphans.quit();
@@ -209,7 +214,14 @@ impl<'a> Pipeline<'a> {
                 self.schedule.end();
                 continue;
             }
-            self.evolve_one(device, pool, picture, outlets);
+            self.evolve_on_cpu(pool, picture, outlets);
+        }
+    }
+
+    /// Evolves a picture to its end on the CPU, which is never lost.
+    pub(super) fn evolve_on_cpu(&self, pool: Option<&ThreadPool>, picture: Ready<'a>, outlets: &Outlets<'a>) {
+        if let Some((picture, error)) = self.evolve_one(&Device::cpu(), pool, picture, outlets) {
+            self.fail(picture.row, error, &outlets.reports);
         }
     }
 

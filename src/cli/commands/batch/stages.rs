@@ -111,14 +111,15 @@ impl<'a> Pipeline<'a> {
         row
     }
 
-    /// Evolves a picture to its end, on the threads of a pool if there is one.
+    /// Evolves a picture to its end, on the threads of a pool if there is one. If the device is lost, the picture comes
+    /// back.
     pub(super) fn evolve_one(
         &self,
         device: &Device,
         pool: Option<&ThreadPool>,
         mut picture: Ready<'a>,
         outlets: &Outlets<'a>,
-    ) {
+    ) -> Option<(Ready<'a>, Error)> {
         let Ready { work: Work { options, prepared, .. }, row, .. } = &mut picture;
         row.device = Some(device.label().to_owned());
         let evolve = || {
@@ -135,8 +136,10 @@ impl<'a> Pipeline<'a> {
             // An interrupted picture leaves no files.
             Ok(Evolved { ending, .. }) if !ending.is_complete() => self.schedule.end(),
             Ok(Evolved { ending, drawn, .. }) => drop(outlets.done.send(Done { ready: picture, ending, drawn })),
+            Err(error @ Error::DeviceLost { .. }) => return Some((picture, error)),
             Err(error) => self.fail(picture.row, error, &outlets.reports),
         }
+        None
     }
 
     /// Reports that a picture failed, and whether all others would fail, too.
