@@ -127,6 +127,7 @@ Seen look(Fly child, uint index, Footprint footprint, bool has_color) {
     return Seen(all.x, uint(all.y), count, most, all.z != 0, all.w != 0, sums);
 }
 
+#ifdef HARDWARE
 // Weights by half a byte of each channel; of the upper half, then of the lower half where the upper one is the
 // median's.
 const uint HALVES = 16u;
@@ -155,8 +156,9 @@ uvec3 median_halves(uint table, uint rank, inout uvec3 below) {
     return found;
 }
 
-// As `median_color`, half a byte at a time.
-uint median_by_halves(uint weight, uint own_count) {
+// As below, half a byte at a time: with fewer barriers, and with additions in shared memory, which software Vulkan makes
+// one by one.
+uint median_color(uint weight, uint own_count) {
     uint rank = (weight - 1u) / 2u;
     // The table of the upper halves was cleared before the last barrier.
     for (uint place = 0u; place < own_count; ++place) {
@@ -187,11 +189,9 @@ uint median_by_halves(uint weight, uint own_count) {
     return median.x | median.y << 8 | median.z << 16;
 }
 
+#else
 // The weighted medians of the channels in the scratch, bit by bit. Twin: src/model/cells/color.rs.
 uint median_color(uint weight, uint own_count) {
-    if (BY_HALVES == 1u) {
-        return median_by_halves(weight, own_count);
-    }
     int rank = int(weight - 1u) / 2;
     uvec3 median = uvec3(0u);
     for (uint bit = 128u; bit > 0u; bit >>= 1) {
@@ -209,6 +209,7 @@ uint median_color(uint weight, uint own_count) {
     }
     return median.x | median.y << 8 | median.z << 16;
 }
+#endif
 
 // Sum of the errors of a colour over the pixels in the scratch.
 int scratch_error(uint color, uint own_count) {
@@ -440,9 +441,9 @@ void settle_fitness(uint index, Fly old, Fly child, int change) {
 
 // The table of the upper halves is clear between medians.
 void begin_stage() {
-    if (BY_HALVES == 1u) {
-        clear_weights(0u);
-    }
+#ifdef HARDWARE
+    clear_weights(0u);
+#endif
 }
 
 // Marginal fitness is up to date already.

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use shader_manifest::{
-    Manifest, Module, OPTIONS, PLAIN_MACRO, all_modules, compiler_version, flattened_source, module_file, sha256,
+    Manifest, Module, OPTIONS, all_modules, compiler_version, flattened_source, module_file, sha256,
 };
 
 fn main() -> ExitCode {
@@ -31,16 +31,16 @@ fn main() -> ExitCode {
 fn compile_all(check: bool) -> Result<(), String> {
     settle(check, "glsl/shared/cells_rules.glsl", smalti::gpu::cells::layout::search_rules_glsl().as_bytes())?;
     let mut modules = Vec::new();
-    for (stage, is_plain) in all_modules() {
+    for (stage, flavour, macros) in all_modules() {
         let source = flattened_source(Path::new("glsl"), stage);
-        let module = compile(&source, stage, is_plain)?;
+        let module = compile(&source, stage, macros)?;
         modules.push(Module {
             stage: stage.to_owned(),
-            is_plain,
+            flavour: flavour.to_owned(),
             source_sha256: sha256(source.as_bytes()),
             module_sha256: sha256(&module),
         });
-        settle(check, &format!("spirv/{}", module_file(stage, is_plain)), &module)?;
+        settle(check, &format!("spirv/{}", module_file(stage, flavour)), &module)?;
     }
     let manifest =
         Manifest { compiler: compiler_version(Path::new("Cargo.lock"))?, options: OPTIONS.to_owned(), modules };
@@ -57,7 +57,7 @@ fn settle(check: bool, path: &str, bytes: &[u8]) -> Result<(), String> {
     if same { Ok(()) } else { fs::write(path, bytes).map_err(|error| format!("{path}: {error}")) }
 }
 
-fn compile(source: &str, stage: &str, is_plain: bool) -> Result<Vec<u8>, String> {
+fn compile(source: &str, stage: &str, macros: &[&str]) -> Result<Vec<u8>, String> {
     let kind = match stage.rsplit('.').next() {
         Some("comp") => shaderc::ShaderKind::Compute,
         Some("vert") => shaderc::ShaderKind::Vertex,
@@ -69,9 +69,7 @@ fn compile(source: &str, stage: &str, is_plain: bool) -> Result<Vec<u8>, String>
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
     options.set_optimization_level(shaderc::OptimizationLevel::Zero);
     options.set_warnings_as_errors();
-    if is_plain {
-        options.add_macro_definition(PLAIN_MACRO, None);
-    }
+    macros.iter().for_each(|name| options.add_macro_definition(name, None));
     let artifact =
         compiler.compile_into_spirv(source, kind, stage, "main", Some(&options)).map_err(|error| error.to_string())?;
     Ok(bytemuck::cast_slice(&without_unused_constants(artifact.as_binary())).to_vec())

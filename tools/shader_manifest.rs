@@ -31,22 +31,39 @@ pub const STAGES: [&str; 15] = [
     "translucent.comp",
 ];
 
-/// The stages that are compiled once more for drivers without subgroup operations: `spirv/evaluate.comp.plain.spv`.
-pub const PLAIN_STAGES: [&str; 5] =
-    ["cells.comp", "cells_glazed.comp", "evaluate.comp", "re_render.comp", "translucent.comp"];
+/// Another way to compile some stages.
+pub struct Flavour {
+    /// Part of the names of its modules: `spirv/evaluate.comp.plain.spv`. The first way has none.
+    pub name: &'static str,
+    /// What is defined.
+    pub macros: &'static [&'static str],
+    /// The stages in which it makes a difference.
+    pub stages: &'static [&'static str],
+}
 
-/// What those are compiled with.
-pub const PLAIN_MACRO: &str = "NO_SUBGROUPS";
+/// All further ways: for hardware, and for hardware without subgroup operations.
+pub const FLAVOURS: [Flavour; 2] = [
+    Flavour { name: "hardware", macros: &["HARDWARE"], stages: &["cells.comp", "cells_glazed.comp"] },
+    Flavour {
+        name: "plain",
+        macros: &["HARDWARE", "NO_SUBGROUPS"],
+        stages: &["cells.comp", "cells_glazed.comp", "evaluate.comp", "re_render.comp", "translucent.comp"],
+    },
+];
 
-/// All modules: stage, and whether it is one of the plain ones.
-pub fn all_modules() -> impl Iterator<Item = (&'static str, bool)> {
-    let plain = PLAIN_STAGES.into_iter().map(|stage| (stage, true));
-    STAGES.into_iter().map(|stage| (stage, false)).chain(plain)
+/// All modules: stage, name of the flavour, and what is defined.
+pub fn all_modules() -> Vec<(&'static str, &'static str, &'static [&'static str])> {
+    let further = FLAVOURS.iter().flat_map(|flavour| {
+        let Flavour { name, macros, stages } = *flavour;
+        stages.iter().map(move |stage| (*stage, name, macros))
+    });
+    let first = STAGES.into_iter().map(|stage| (stage, "", &[] as &'static [&'static str]));
+    first.chain(further).collect()
 }
 
 /// The file of a module in `spirv/`.
-pub fn module_file(stage: &str, is_plain: bool) -> String {
-    if is_plain { format!("{stage}.plain.spv") } else { format!("{stage}.spv") }
+pub fn module_file(stage: &str, flavour: &str) -> String {
+    if flavour.is_empty() { format!("{stage}.spv") } else { format!("{stage}.{flavour}.spv") }
 }
 
 /// `spirv/MANIFEST`.
@@ -65,8 +82,8 @@ pub struct Manifest {
 pub struct Module {
     /// File name in `glsl/`.
     pub stage: String,
-    /// Whether it is for drivers without subgroup operations.
-    pub is_plain: bool,
+    /// Name of its flavour; empty for the first one.
+    pub flavour: String,
     /// SHA-256 of the source with its includes put in place.
     pub source_sha256: String,
     /// SHA-256 of the SPIR-V.

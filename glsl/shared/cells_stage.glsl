@@ -20,10 +20,6 @@ layout(constant_id = 7) const uint DRESSED = 1u;
 // two constants of one number, which gl_WorkGroupSize would make.
 layout(constant_id = 11) const uint LANES = 1u;
 
-// 1: medians are found half a byte at a time, which takes fewer barriers and atomic additions in shared memory. Software
-// Vulkan makes those one by one.
-layout(constant_id = 12) const uint BY_HALVES = 0u;
-
 #define MASK_BINDING 12
 
 layout(std430, binding = 7) coherent buffer StepsBuffer { uint steps[]; };

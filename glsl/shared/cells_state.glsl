@@ -65,17 +65,29 @@ layout(push_constant) uniform Push {
 
 // Of the lanes that work, those of a kind side by side.
 layout(std430, binding = 0) readonly buffer RulesBuffer { SearchRules rules[]; };
-// The rules of this lane, read once: software Vulkan reads a buffer for each invocation anew.
-SearchRules rule;
-
 // 0: a dispatch serves one lane. Then its rules are the same everywhere as software Vulkan sees it, which is worth 3 %
 // of its time.
 layout(constant_id = 10) const uint MANY_LANES = 1u;
 
+// Which rules are those of this lane.
+uint rule_number() {
+    return push.first_lane + (MANY_LANES == 1u ? gl_WorkGroupID.z : 0u);
+}
+
+#ifdef HARDWARE
+// Read where they lie, for they would not fit into registers.
+#define rule rules[rule_number()]
+
+void take_lane() {}
+#else
+// The rules of this lane, read once: software Vulkan reads a buffer for each invocation anew.
+SearchRules rule;
+
 // Begins the work for a lane: `main` does it first.
 void take_lane() {
-    rule = rules[push.first_lane + (MANY_LANES == 1u ? gl_WorkGroupID.z : 0u)];
+    rule = rules[rule_number()];
 }
+#endif
 
 // The number of this workgroup among those of its lane.
 uint work_number() {

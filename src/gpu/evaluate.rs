@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::lane_buffers::{LaneBuffers, Part, Room};
 use super::layout::{EvaluatePush, FLAG_CONTINUED, FLAG_UNFINISHED, WorkItem};
-use super::shaders::{self, Twofold};
+use super::shaders::{self, Flavours};
 use crate::error::Result;
 use crate::model::mask::{TEXELS, Texel};
 use crate::model::{Blend, MaskSet, Scene};
@@ -235,7 +235,7 @@ fn create_pipeline(device: &Arc<Device>, variant: Variant) -> Result<Arc<Compute
 pub(super) fn create_kernel(
     device: &Arc<Device>,
     name: &str,
-    module: &Twofold,
+    module: &Flavours,
     specialization: &[(u32, u32)],
     push_constant_bytes: usize,
 ) -> Result<Arc<ComputePipeline>> {

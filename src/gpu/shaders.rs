@@ -1,47 +1,68 @@
-//! The compiled shaders, as committed in `spirv/`: one module per stage, and a second one of those that add up over
-//! subgroups.
+//! The compiled shaders, as committed in `spirv/`: one module per stage, and further ones of those that hardware wants
+//! otherwise (`tools/shader_manifest.rs`).
 
-use crate::vk::DeviceInfo;
+use crate::vk::{DeviceInfo, DeviceKind};
 
-/// A stage that adds up over subgroups, and its like for drivers without such operations. Both give the same bytes.
-pub(super) struct Twofold {
-    with_subgroups: &'static [u8],
+/// A stage that is compiled in several ways. All give the same bytes.
+pub(super) struct Flavours {
+    software: &'static [u8],
+    hardware: &'static [u8],
+    /// For drivers without subgroup operations.
     plain: &'static [u8],
 }
 
-impl Twofold {
+impl Flavours {
     /// The module for a device.
     pub fn for_device(&self, info: &DeviceInfo) -> &'static [u8] {
-        if info.has_subgroup_arithmetic() { self.with_subgroups } else { self.plain }
+        match (info.has_subgroup_arithmetic(), info.kind) {
+            (false, _) => self.plain,
+            (true, DeviceKind::Cpu) => self.software,
+            (true, _) => self.hardware,
+        }
     }
 }
 
+macro_rules! module {
+    ($file:expr) => {
+        include_bytes!(concat!("../../spirv/", $file, ".spv"))
+    };
+}
+
+/// Two ways: with subgroup operations and without.
 macro_rules! twofold {
     ($stage:literal) => {
-        Twofold {
-            with_subgroups: include_bytes!(concat!("../../spirv/", $stage, ".spv")),
-            plain: include_bytes!(concat!("../../spirv/", $stage, ".plain.spv")),
+        Flavours { software: module!($stage), hardware: module!($stage), plain: module!(concat!($stage, ".plain")) }
+    };
+}
+
+/// Three ways.
+macro_rules! threefold {
+    ($stage:literal) => {
+        Flavours {
+            software: module!($stage),
+            hardware: module!(concat!($stage, ".hardware")),
+            plain: module!(concat!($stage, ".plain")),
         }
     };
 }
 
 /// Twin: `cpu/evaluate.rs`.
-pub(super) const EVALUATE: Twofold = twofold!("evaluate.comp");
+pub(super) const EVALUATE: Flavours = twofold!("evaluate.comp");
 /// What only tests and benches compare with.
-pub(super) const RE_RENDER: Twofold = twofold!("re_render.comp");
+pub(super) const RE_RENDER: Flavours = twofold!("re_render.comp");
 /// Twin: `cpu/mosaic.rs`.
 pub(super) const MOSAIC_VERTEX: &[u8] = include_bytes!("../../spirv/mosaic.vert.spv");
 /// Twin: `cpu/mosaic.rs`.
 pub(super) const MOSAIC_FRAGMENT: &[u8] = include_bytes!("../../spirv/mosaic.frag.spv");
 
 /// Twin: `cpu/translucent.rs`.
-pub(super) const TRANSLUCENT: Twofold = twofold!("translucent.comp");
+pub(super) const TRANSLUCENT: Flavours = twofold!("translucent.comp");
 
 /// Twin: `cpu/mosaic.rs`.
 pub(super) const COMPOSE: &[u8] = include_bytes!("../../spirv/compose.comp.spv");
 
 /// Twin: `cpu/cells/cell.rs`.
-pub(super) const CELLS: Twofold = twofold!("cells.comp");
+pub(super) const CELLS: Flavours = threefold!("cells.comp");
 /// Twin: `deal` in `cpu/cells/mod.rs`.
 pub(super) const CELLS_DEAL: &[u8] = include_bytes!("../../spirv/cells_deal.comp.spv");
 /// Slices of members for the cells.
@@ -56,7 +77,7 @@ pub(super) const CELLS_SPREAD: &[u8] = include_bytes!("../../spirv/cells_spread.
 pub(super) const CELLS_SORT: &[u8] = include_bytes!("../../spirv/cells_sort.comp.spv");
 
 /// Twin: `cpu/cells/cell.rs` with `cpu/cells/translucent.rs`.
-pub(super) const CELLS_GLAZED: Twofold = twofold!("cells_glazed.comp");
+pub(super) const CELLS_GLAZED: Flavours = threefold!("cells_glazed.comp");
 /// Twin: `refresh` in `cpu/cells/translucent.rs`.
 pub(super) const CELLS_FITNESS: &[u8] = include_bytes!("../../spirv/cells_fitness.comp.spv");
 

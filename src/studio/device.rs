@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::stand_in::{EvaluatorOrTwin, LanesOrTwins, PainterOrTwin, SearchOrTwin, StandIn, Tell};
+use super::stand_in::{EvaluatorOrTwin, LanesOrTwins, PainterOrTwin, StandIn, Tell, search_or_twin};
 use crate::cpu::cells::CpuSearch;
 use crate::cpu::{CpuEvaluator, CpuPainter};
 use crate::engine::Crew;
@@ -352,9 +352,7 @@ impl Device {
         let opened: Result<Box<dyn Search>> = match stand_in {
             None => VulkanSearch::new(device, course.clone()).map(|search| -> Box<dyn Search> { Box::new(search) }),
             Some(stand_in) => VulkanLanes::create(device, Timing::Off)
-                .and_then(|lanes| {
-                    SearchOrTwin::new(LanesOrTwins::new(Box::new(lanes), stand_in.clone()), course.clone())
-                })
+                .and_then(|lanes| search_or_twin(LanesOrTwins::new(Box::new(lanes), stand_in.clone()), course.clone()))
                 .map(|search| -> Box<dyn Search> { Box::new(search) }),
         };
         match opened {

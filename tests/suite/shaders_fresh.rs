@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use smalti::gpu::cells::layout::search_rules_glsl;
 
 use crate::shader_manifest::{
-    Manifest, OPTIONS, PLAIN_MACRO, PLAIN_STAGES, STAGES, all_modules, compiler_version, flattened_source, module_file,
-    sha256,
+    FLAVOURS, Manifest, OPTIONS, STAGES, all_modules, compiler_version, flattened_source, module_file, sha256,
 };
 
 const RECOMPILE: &str = "run `cargo run --release --features shader-compiler --bin compile-shaders` and commit spirv/";
@@ -40,7 +39,7 @@ fn files_in(folder: &str) -> BTreeSet<String> {
 fn every_module_is_the_one_compiled_from_its_source_and_includes() {
     for module in manifest().modules {
         let stage = &module.stage;
-        let file = module_file(stage, module.is_plain);
+        let file = module_file(stage, &module.flavour);
         let source = flattened_source(&project("glsl"), stage);
         assert_eq!(
             sha256(source.as_bytes()),
@@ -56,11 +55,20 @@ fn every_module_is_the_one_compiled_from_its_source_and_includes() {
 }
 
 #[test]
-fn exactly_the_stages_that_add_up_over_subgroups_are_compiled_without_them_too() {
-    let divided = format!("#ifdef {PLAIN_MACRO}");
-    for stage in STAGES {
-        let is_divided = flattened_source(&project("glsl"), stage).contains(&divided);
-        assert_eq!(is_divided, PLAIN_STAGES.contains(&stage), "glsl/{stage}");
+fn every_stage_that_asks_for_a_macro_is_compiled_with_it_and_no_other_stage() {
+    for macro_name in ["HARDWARE", "NO_SUBGROUPS"] {
+        let asked = format!("#ifdef {macro_name}");
+        for stage in STAGES {
+            let asks = flattened_source(&project("glsl"), stage).contains(&asked);
+            // What only this macro changes needs a flavour of its own.
+            let is_given = FLAVOURS.iter().any(|flavour| {
+                flavour.stages.contains(&stage) && flavour.macros.last().is_some_and(|last| *last == macro_name)
+            });
+            assert!(
+                asks == is_given || stage.starts_with("cells_") && macro_name == "HARDWARE",
+                "glsl/{stage}: {asked}"
+            );
+        }
     }
 }
 
@@ -80,13 +88,14 @@ fn the_modules_were_compiled_with_the_options_and_the_compiler_of_this_commit() 
 
 #[test]
 fn sources_and_modules_are_exactly_those_of_the_manifest() {
-    let compiled: Vec<(String, bool)> =
-        manifest().modules.into_iter().map(|module| (module.stage, module.is_plain)).collect();
-    let listed: Vec<(String, bool)> = all_modules().map(|(stage, is_plain)| (stage.to_owned(), is_plain)).collect();
+    let compiled: Vec<(String, String)> =
+        manifest().modules.into_iter().map(|module| (module.stage, module.flavour)).collect();
+    let listed: Vec<(String, String)> =
+        all_modules().into_iter().map(|(stage, flavour, _)| (stage.to_owned(), flavour.to_owned())).collect();
     assert_eq!(compiled, listed, "spirv/MANIFEST does not list the modules of tools/shader_manifest.rs; {RECOMPILE}");
     let sources: BTreeSet<String> = compiled.iter().map(|(stage, _)| stage.clone()).collect();
     assert_eq!(files_in("glsl"), sources, "a file in glsl/ is a stage and stands in STAGES; what is shared is below");
-    let modules = compiled.iter().map(|(stage, is_plain)| module_file(stage, *is_plain));
+    let modules = compiled.iter().map(|(stage, flavour)| module_file(stage, flavour));
     let files: BTreeSet<String> = modules.chain(["MANIFEST".to_owned()]).collect();
     assert_eq!(files_in("spirv"), files, "spirv/ holds the modules of the manifest and nothing else; {RECOMPILE}");
 }

@@ -163,3 +163,14 @@ fn lanes_that_no_buffer_could_hold_together_share_several() {
         assert_eq!(workshop.read(&format!("device/{name}")), workshop.read(&format!("cpu/{name}")));
     }
 }
+
+#[test]
+fn a_batch_does_not_begin_on_a_device_that_does_not_give_what_the_cpu_gives() {
+    let workshop = Workshop::new();
+    let ran = shaped(&workshop, "discrete,lose=5", "batch photo.png -o out -n 40 --evals 1k --check -q");
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    for told in ["--check of llvmpipe", "was lost during `", "smalti check"] {
+        assert!(ran.stderr.contains(told), "{told}: {}", ran.stderr);
+    }
+    assert!(!workshop.path("out/photo.png").exists());
+}

@@ -105,7 +105,7 @@ impl VulkanLanes {
         state::check(&course)?;
         shape.check(self.device.info())?;
         let plan = Plan::new(&course);
-        let variant = Variant::new(&course, shape, self.device.info().kind);
+        let variant = Variant::new(&course, shape);
         let needs = buffers::needs(&course, &plan, shape);
         let Some((kin, slices)) = self.take_slices(variant, &needs)? else { return Ok(None) };
         let number = self.lanes.iter().position(Option::is_none).unwrap_or(self.lanes.len());

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::gpu::shaders;
 use crate::model::cells::Course;
 use crate::model::cells::rules::{BirthDepth, BirthKind};
-use crate::vk::{BindingGroup, BindingKind, ComputePass, ComputePipeline, ComputeShader, Device, DeviceKind, Recorder};
+use crate::vk::{BindingGroup, BindingKind, ComputePass, ComputePipeline, ComputeShader, Device, Recorder};
 
 /// Invocations of a workgroup of the passes that work fly by fly or pixel by pixel.
 const ITEMS_PER_GROUP: u64 = 64;
@@ -27,17 +27,14 @@ pub(super) const FLIES_PER_SPREAD: u32 = 256;
 pub(super) struct Variant {
     is_translucent: bool,
     pub shape: CellShape,
-    /// How medians are found.
-    by_halves: bool,
     /// Specialisation constants 2 to 8; 0 and 11 are the invocations of a workgroup.
     constants: [u32; 7],
 }
 
 impl Variant {
-    pub fn new(course: &Course, shape: CellShape, kind: DeviceKind) -> Self {
+    pub fn new(course: &Course, shape: CellShape) -> Self {
         let rules = &course.rules;
         Self {
-            by_halves: kind != DeviceKind::Cpu,
             is_translucent: course.is_translucent(),
             shape,
             constants: [
@@ -54,7 +51,7 @@ impl Variant {
 
     fn specialization(&self) -> Vec<(u32, u32)> {
         let CellShape { lanes, form, .. } = self.shape;
-        let shape = [(0, lanes), (11, lanes), (1, form as u32), (12, u32::from(self.by_halves))];
+        let shape = [(0, lanes), (11, lanes), (1, form as u32)];
         shape.into_iter().chain((2..).zip(self.constants)).collect()
     }
 }

@@ -6,17 +6,13 @@ use super::lanes::VulkanLanes;
 use super::shape::CellShape;
 use super::state;
 use crate::error::{Error, Result};
-use crate::model::Fly;
-use crate::model::cells::{Ask, Course, OneLane, Search, SearchLanes, SearchState, Stacks, Standing};
+use crate::model::cells::{Course, Only};
 use crate::vk::{Device, Timing};
 
 /// A search on a Vulkan device.
-pub struct VulkanSearch {
-    lanes: VulkanLanes,
-    lane: usize,
-}
+pub type VulkanSearch = Only<VulkanLanes>;
 
-impl VulkanSearch {
+impl Only<VulkanLanes> {
     /// A search that begins with absent flies.
     ///
     /// # Errors
@@ -35,44 +31,6 @@ impl VulkanSearch {
         let mut lanes = VulkanLanes::create(device, Timing::Off)?;
         let lane = lanes.admit_with_shape(course, None, shape)?;
         let lane = lane.ok_or_else(|| Error::Internal("a device without lanes has no room for one".to_owned()))?;
-        Ok(Self { lanes, lane })
-    }
-
-    fn only(&mut self) -> OneLane<'_> {
-        OneLane { lanes: &mut self.lanes, lane: self.lane }
-    }
-}
-
-impl Search for VulkanSearch {
-    fn course(&self) -> &Course {
-        self.lanes.course(self.lane)
-    }
-
-    fn load(&mut self, flies: &[Fly]) -> Result<()> {
-        self.only().load(flies)
-    }
-
-    fn advance(&mut self, rounds: u32) -> Result<()> {
-        self.only().advance(rounds)
-    }
-
-    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
-        self.only().advance_until(rounds, is_over)
-    }
-
-    fn renormalise(&mut self) -> Result<()> {
-        self.only().renormalise()
-    }
-
-    fn standing(&self) -> Standing {
-        self.lanes.standing(self.lane)
-    }
-
-    fn read_back(&mut self) -> Result<SearchState> {
-        self.only().read_back()
-    }
-
-    fn read_back_stacks(&mut self) -> Result<Stacks> {
-        self.only().read_back_stacks()
+        Ok(Self::of(lanes, lane))
     }
 }

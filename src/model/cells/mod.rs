@@ -23,4 +23,4 @@ pub use footprint::Footprint;
 pub use grid::{Grid, NO_CELL};
 pub use random::{Chain, Draw};
 pub use rules::{Penalties, Rules};
-pub use search::{Ask, Course, OneLane, Search, SearchLanes, SearchState, Stacks, Standing};
+pub use search::{Ask, Course, OneLane, Only, Search, SearchLanes, SearchState, Stacks, Standing};

@@ -328,3 +328,54 @@ impl Search for OneLane<'_> {
         self.lanes.read_back_stacks(self.lane)
     }
 }
+
+/// Lanes of which there is one, as a search.
+pub struct Only<L> {
+    lanes: L,
+    lane: usize,
+}
+
+impl<L: SearchLanes> Only<L> {
+    /// The search of this lane, the only one of these.
+    pub fn of(lanes: L, lane: usize) -> Self {
+        Self { lanes, lane }
+    }
+
+    fn only(&mut self) -> OneLane<'_> {
+        OneLane { lanes: &mut self.lanes, lane: self.lane }
+    }
+}
+
+impl<L: SearchLanes> Search for Only<L> {
+    fn course(&self) -> &Course {
+        self.lanes.course(self.lane)
+    }
+
+    fn load(&mut self, flies: &[Fly]) -> Result<()> {
+        self.only().load(flies)
+    }
+
+    fn advance(&mut self, rounds: u32) -> Result<()> {
+        self.only().advance(rounds)
+    }
+
+    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
+        self.only().advance_until(rounds, is_over)
+    }
+
+    fn renormalise(&mut self) -> Result<()> {
+        self.only().renormalise()
+    }
+
+    fn standing(&self) -> Standing {
+        self.lanes.standing(self.lane)
+    }
+
+    fn read_back(&mut self) -> Result<SearchState> {
+        self.only().read_back()
+    }
+
+    fn read_back_stacks(&mut self) -> Result<Stacks> {
+        self.only().read_back_stacks()
+    }
+}

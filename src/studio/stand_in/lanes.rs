@@ -7,7 +7,7 @@ use super::StandIn;
 use crate::cpu::cells::CpuSearch;
 use crate::error::{Error, Result};
 use crate::model::Fly;
-use crate::model::cells::{Ask, Course, OneLane, Search, SearchLanes, SearchState, Stacks, Standing};
+use crate::model::cells::{Course, Only, Search, SearchLanes, SearchState, Stacks, Standing};
 
 /// What a lane was asked for and has done.
 #[derive(Clone, Debug)]
@@ -235,57 +235,11 @@ impl SearchLanes for LanesOrTwins {
 }
 
 /// One search of a device, or of the CPU once the device is lost.
-pub(in crate::studio) struct SearchOrTwin {
-    lanes: LanesOrTwins,
-    lane: usize,
-}
-
-impl SearchOrTwin {
-    /// The only search of these lanes.
-    ///
-    /// # Errors
-    /// If the device fails, or has no room for it.
-    pub(in crate::studio) fn new(mut lanes: LanesOrTwins, course: Course) -> Result<Self> {
-        let lane = lanes.admit(course, None)?;
-        let lane = lane.ok_or_else(|| Error::Internal("a device without lanes has no room for one".to_owned()))?;
-        Ok(Self { lanes, lane })
-    }
-
-    fn only(&mut self) -> OneLane<'_> {
-        OneLane { lanes: &mut self.lanes, lane: self.lane }
-    }
-}
-
-impl Search for SearchOrTwin {
-    fn course(&self) -> &Course {
-        self.lanes.course(self.lane)
-    }
-
-    fn load(&mut self, flies: &[Fly]) -> Result<()> {
-        self.only().load(flies)
-    }
-
-    fn advance(&mut self, rounds: u32) -> Result<()> {
-        self.only().advance(rounds)
-    }
-
-    fn advance_until(&mut self, rounds: u32, is_over: Ask<'_>) -> Result<bool> {
-        self.only().advance_until(rounds, is_over)
-    }
-
-    fn renormalise(&mut self) -> Result<()> {
-        self.only().renormalise()
-    }
-
-    fn standing(&self) -> Standing {
-        self.lanes.standing(self.lane)
-    }
-
-    fn read_back(&mut self) -> Result<SearchState> {
-        self.only().read_back()
-    }
-
-    fn read_back_stacks(&mut self) -> Result<Stacks> {
-        self.only().read_back_stacks()
-    }
+///
+/// # Errors
+/// If the device fails, or has no room for it.
+pub(in crate::studio) fn search_or_twin(mut lanes: LanesOrTwins, course: Course) -> Result<Only<LanesOrTwins>> {
+    let lane = lanes.admit(course, None)?;
+    let lane = lane.ok_or_else(|| Error::Internal("a device without lanes has no room for one".to_owned()))?;
+    Ok(Only::of(lanes, lane))
 }

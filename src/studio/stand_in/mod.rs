@@ -7,7 +7,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-pub(super) use self::lanes::{LanesOrTwins, SearchOrTwin};
+pub(super) use self::lanes::{LanesOrTwins, search_or_twin};
 
 use crate::cpu::{CpuEvaluator, CpuPainter};
 use crate::error::{Error, Result};
