@@ -109,9 +109,6 @@ impl ComputingArgs {
         }
         let in_range = |count| values::in_range("--threads", count, 1..=THREADS_MAX).map(|count| count as usize);
         let asked_for = self.threads.and_then(|ThreadChoice(count)| count);
-        if self.device_timeout.is_some_and(|timeout| timeout.is_zero()) {
-            return Err(Error::Usage("--device-timeout 0: must be above 0, such as 30s".to_owned()));
-        }
         let threads = asked_for.map(in_range).transpose()?;
         let Self { on_device_lost, device_timeout, .. } = *self;
         Ok(Computing { request, validation, on_device_lost, device_timeout, threads })
