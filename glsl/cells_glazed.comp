@@ -174,7 +174,7 @@ Laid lay(Swap swap, bool has_color) {
                         laid.change += glazed_error(sums, folded.rest.transmittance, top.x, want);
                     }
                 }
-                inner_turns += stack_turns(most_of_subgroup(depth));
+                inner_turns += stack_turns(waited_for(depth, GLAZED_DEPTH));
             }
         }
     }
@@ -337,7 +337,7 @@ uint exchange(Swap swap) {
                     depth = top.x >> 24;
                     exchange_pixel(swap, place, top, texel);
                 }
-                inner_turns += stack_turns(most_of_subgroup(depth));
+                inner_turns += stack_turns(waited_for(depth, GLAZED_DEPTH));
             }
         }
     }

@@ -13,6 +13,11 @@ uint most_of_subgroup(uint value) {
     return value;
 }
 
+// An invocation cannot know what others make it wait for.
+uint waited_for(uint turns, uint most) {
+    return most;
+}
+
 bool speaks_for_subgroup() {
     return true;
 }
@@ -32,6 +37,11 @@ ivec4 over_subgroup(ivec4 value) {
 
 uint most_of_subgroup(uint value) {
     return subgroupMax(value);
+}
+
+// Turns of a loop that every invocation of the subgroup waits for: each has its own number, at most `most`.
+uint waited_for(uint turns, uint most) {
+    return most_of_subgroup(turns);
 }
 
 // One invocation of the subgroup.

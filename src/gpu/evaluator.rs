@@ -52,7 +52,7 @@ impl GpuEvaluator {
             translucent: None,
             lanes: Vec::with_capacity(scenes.len()),
             work: Work::default(),
-            pace: Pace::for_kind(device.info().kind, ITEMS_FIRST),
+            pace: Pace::new(device.info().kind, ITEMS_FIRST),
         };
         evaluator.make_room_for_translucent(&scenes.iter().collect::<Vec<_>>())?;
         for scene in scenes {

@@ -17,21 +17,16 @@ const SHORTEST: Duration = Duration::from_millis(50);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Pace {
     units: u64,
-    most: u64,
     /// Whether it follows the time.
     is_measured: bool,
 }
 
 impl Pace {
-    /// Begins with so many units, and never takes more than `most`.
-    pub fn new(first: u64, most: u64) -> Self {
-        Self { units: first.clamp(1, most), most, is_measured: true }
-    }
-
-    /// As [`Pace::new`] for hardware. Software Vulkan has no watchdog: there a submission takes what it is given.
-    pub fn for_kind(kind: DeviceKind, first: u64) -> Self {
+    /// Begins with so many units on hardware. Software Vulkan has no watchdog: there a submission takes what it is
+    /// given.
+    pub fn new(kind: DeviceKind, first: u64) -> Self {
         let is_measured = kind != DeviceKind::Cpu;
-        Self { is_measured, ..Self::new(if is_measured { first } else { u64::MAX }, u64::MAX) }
+        Self { units: if is_measured { first.max(1) } else { u64::MAX }, is_measured }
     }
 
     /// The most units of the next submission.
@@ -50,7 +45,7 @@ impl Pace {
             self.units = ((units as f64 * share) as u64).min(self.units).max(1);
         } else if took < SHORTEST && units.saturating_mul(2) > self.units {
             // It was nearly as much as it might be.
-            self.units = self.units.saturating_mul(2).min(self.most);
+            self.units = self.units.saturating_mul(2);
         }
     }
 }
@@ -65,7 +60,7 @@ mod tests {
 
     #[test]
     fn a_submission_that_took_too_long_is_followed_by_shorter_ones() {
-        let mut pace = Pace::new(1_000, 4_000);
+        let mut pace = Pace::new(DeviceKind::Discrete, 1_000);
         pace.note(1_000, ms(1_000));
         assert_eq!(pace.units(), 100);
         for _ in 0..8 {
@@ -77,7 +72,7 @@ mod tests {
 
     #[test]
     fn short_submissions_grow_until_they_are_long_enough() {
-        let mut pace = Pace::new(8, 4_000);
+        let mut pace = Pace::new(DeviceKind::Discrete, 8);
         // A device that makes a unit in a tenth of a millisecond.
         let mut units = Vec::new();
         for _ in 0..12 {
@@ -86,16 +81,11 @@ mod tests {
         }
         assert_eq!(units[..7], [16, 32, 64, 128, 256, 512, 512], "{units:?}");
         assert_eq!(units[11], 512);
-        let mut fast = Pace::new(8, 40);
-        for _ in 0..5 {
-            fast.note(fast.units(), ms(0));
-        }
-        assert_eq!(fast.units(), 40);
     }
 
     #[test]
     fn a_submission_that_had_little_to_do_says_nothing() {
-        let mut pace = Pace::new(100, 4_000);
+        let mut pace = Pace::new(DeviceKind::Discrete, 100);
         pace.note(10, ms(1));
         assert_eq!(pace.units(), 100);
         pace.note(10, ms(400));
@@ -106,9 +96,9 @@ mod tests {
 
     #[test]
     fn software_takes_what_it_is_given() {
-        let mut software = Pace::for_kind(DeviceKind::Cpu, 5);
+        let mut software = Pace::new(DeviceKind::Cpu, 5);
         software.note(1_000, ms(9_000));
         assert_eq!(software.units(), u64::MAX);
-        assert_eq!(Pace::for_kind(DeviceKind::Integrated, 5).units(), 5);
+        assert_eq!(Pace::new(DeviceKind::Integrated, 5).units(), 5);
     }
 }

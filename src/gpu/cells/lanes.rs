@@ -86,7 +86,7 @@ impl VulkanLanes {
             lanes: Vec::new(),
             is_arranged: false,
             next: (0, 0),
-            pace: Pace::for_kind(device.info().kind, CELLS_FIRST),
+            pace: Pace::new(device.info().kind, CELLS_FIRST),
             recorded: 0,
             is_spreading: false,
         })

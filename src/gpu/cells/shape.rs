@@ -46,11 +46,8 @@ impl CellShape {
             let what = format!("{} tiles are too many for one dispatch of software Vulkan", course.fly_count);
             return Err(Error::TooLarge { what, remedies: &[Remedy::FewerTiles, Remedy::Cpu] });
         }
-        // Without subgroup operations an invocation knows only its own turns, and not those that it waits for.
-        let is_sure = info.has_subgroup_arithmetic() || !info.cuts_loops_short();
-        let budget = if is_sure { BUDGET } else { BUDGET / 2 };
-        let narrow = Self { lanes: info.subgroup_size, form: CellForm::Narrow, budget };
-        let wide = |lanes| Self { lanes, form: CellForm::Wide, budget };
+        let narrow = Self { lanes: info.subgroup_size, form: CellForm::Narrow, budget: BUDGET };
+        let wide = |lanes| Self { lanes, form: CellForm::Wide, budget: BUDGET };
         let most = LANES_MAX.min(info.limits.workgroup_invocations);
         let first = (info.kind == DeviceKind::Cpu && info.has_subgroup_arithmetic()).then_some(narrow);
         // What software gains by width it pays for barriers.
@@ -58,7 +55,7 @@ impl CellShape {
             if info.kind == DeviceKind::Cpu { (2 * info.subgroup_size).min(LANES_WIDE) } else { LANES_WIDE };
         let lanes = (narrowest.ilog2()..=most.ilog2()).map(|power| 1 << power);
         let mut shapes = first.into_iter().chain(lanes.map(wide));
-        if let Some(shape) = shapes.find(|shape| shape.longest_step(course) <= u64::from(budget)) {
+        if let Some(shape) = shapes.find(|shape| shape.longest_step(course) <= u64::from(BUDGET)) {
             return Ok(shape);
         }
         let widest = wide(1 << most.ilog2());
