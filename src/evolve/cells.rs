@@ -98,6 +98,23 @@ pub fn step(search: &mut dyn Search, drive: &mut Drive, observer: &mut dyn Obser
     }
 }
 
+/// Ends a search that stands between two epochs and has no reason to go on, as its next [`step`] would; returns that
+/// reason. Otherwise nothing happens.
+///
+/// # Errors
+/// If the device fails.
+pub fn end_if_spent(search: &mut dyn Search, drive: &mut Drive) -> Result<Option<StopReason>> {
+    let is_within_an_epoch = drive.rounds_left.is_some_and(|left| left > 0);
+    if is_within_an_epoch && search.standing().evals < drive.budget.evals {
+        return Ok(None);
+    }
+    let Some(reason) = spent(search, &drive.budget, &mut drive.mark)? else { return Ok(None) };
+    if drive.rounds_left.take().is_some() {
+        search.renormalise()?;
+    }
+    Ok(Some(reason))
+}
+
 /// Makes some rounds; returns a reason if one of them was cut short.
 fn advance(search: &mut dyn Search, rounds: u32, brake: &Brake) -> Result<Option<StopReason>> {
     if brake.is_absent() {

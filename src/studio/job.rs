@@ -205,7 +205,7 @@ impl Job {
     }
 
     /// The lane that the job becomes.
-    fn scene(&self) -> Scene {
+    pub(super) fn scene(&self) -> Scene {
         Scene {
             target: Arc::clone(&self.target),
             masks: Arc::new(self.masks()),

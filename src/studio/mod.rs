@@ -41,6 +41,7 @@ mod recipe;
 mod session;
 mod settings;
 mod stand_in;
+mod story;
 mod text_file;
 mod tile;
 mod words;
