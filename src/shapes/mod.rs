@@ -22,7 +22,7 @@ mod wardrobe;
 
 pub use built_in::BuiltIn;
 pub use ink::Ink;
-pub use read::{MASK_FILE_BYTES_MAX, decode, read};
+pub use read::{MASK_FILE_BYTES_MAX, decode, decode_svg, read};
 pub use shader::Shader;
 pub use template::{Source, Template};
 pub use wardrobe::{Outfit, Wardrobe};

@@ -45,6 +45,14 @@ pub fn decode(bytes: &[u8]) -> Result<Template, String> {
     Ok(Template::new(Source::Memory, ink_in(bytes, false)?))
 }
 
+/// As [`decode`], of a file that is called an SVG.
+///
+/// # Errors
+/// A sentence without the mask's name.
+pub fn decode_svg(bytes: &[u8]) -> Result<Template, String> {
+    Ok(Template::new(Source::Memory, ink_in(bytes, true)?))
+}
+
 /// What the bytes of a file draw.
 fn ink_in(bytes: &[u8], looks_like_svg: bool) -> Result<Vec<Ink>, String> {
     let mut ink = if bytes.is_empty() {

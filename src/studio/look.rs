@@ -53,6 +53,15 @@ impl Mask {
         Ok(Self(MaskSource::Template(Arc::new(template))))
     }
 
+    /// As [`Mask::from_encoded`], of the bytes of a file that is called an SVG.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if it cannot be read or draws nothing.
+    pub(super) fn from_svg(bytes: &[u8]) -> Result<Self> {
+        let template = shapes::decode_svg(bytes).map_err(|reason| Error::parameter("mask", reason))?;
+        Ok(Self(MaskSource::Template(Arc::new(template))))
+    }
+
     /// A built-in shape if it has this name, in any case, else the file at this path, which is read when it is needed.
     pub(crate) fn named_or_file(name: impl Into<PathBuf>) -> Self {
         let path = name.into();

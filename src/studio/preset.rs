@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
+use serde_json::{Map, Value};
 
 use super::choices::{Colors, GroutColor};
 use super::look::{MASK_COUNT_MAX, Mask};
@@ -249,6 +250,12 @@ impl Preset {
             *mask = folder.join(&mask);
         }
         Ok(file)
+    }
+
+    /// A preset of these words, whose masks are built in.
+    pub(super) fn of_words(words: Map<String, Value>) -> Result<Self, String> {
+        let preset = Self::deserialize(Value::Object(words)).map_err(|error| error.to_string())?;
+        preset.check().map(|()| preset)
     }
 
     /// Why the file cannot be followed, though each of its words can be read.

@@ -147,7 +147,7 @@ impl Provenance {
     }
 
     /// The provenance of the same mosaic drawn with a longer side of `resized_px`, or as it evolved.
-    pub(super) fn resized(&self, resized_px: Option<u32>) -> Self {
+    pub(crate) fn resized(&self, resized_px: Option<u32>) -> Self {
         let mut recipe = self.decisive("recipe").as_object().cloned().unwrap_or_default();
         match resized_px {
             Some(px) => recipe.insert(OUTPUT_SIZE.to_owned(), px.into()),

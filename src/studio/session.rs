@@ -142,6 +142,13 @@ impl<'d> Session<'d> {
         self.job.evals_planned()
     }
 
+    /// What [`super::Script::until`] is to be if the session ends here: its evals, unless it has come to its end by
+    /// itself.
+    #[must_use]
+    pub fn until(&mut self) -> Option<u64> {
+        if self.stop.is_none() { Some(self.evals()) } else { None }
+    }
+
     /// The fitted picture, which the tiles imitate: at the size at which it evolves, and in its colours.
     #[must_use]
     pub fn target(&self) -> Image {
@@ -258,7 +265,7 @@ impl<'d> Session<'d> {
 
     /// What decides the mosaic as it is now.
     fn provenances(&mut self) -> Provenances {
-        let until = if self.stop.is_none() { Some(self.evals()) } else { None };
+        let until = self.until();
         self.story.provenances(until)
     }
 

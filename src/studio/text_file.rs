@@ -54,7 +54,7 @@ pub(crate) fn toml_mistake(text: &str, error: &toml::de::Error) -> String {
 }
 
 /// The beginning of a message, which may repeat a word of any length.
-fn brief(message: &str) -> String {
+pub(super) fn brief(message: &str) -> String {
     match message.char_indices().nth(MESSAGE_CHARS_MAX) {
         Some((end, _)) => format!("{}..", &message[..end]),
         None => message.to_owned(),

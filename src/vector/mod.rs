@@ -6,7 +6,7 @@
 //! grout's colour, and over that the part inside its ring. A transparent picture has no background element. The
 //! document is plain SVG 1.1 without scripts, fonts or links, with the same bytes every time.
 
-mod base64;
+pub(crate) mod base64;
 mod outline;
 mod shapes;
 mod tiles;

@@ -4,5 +4,6 @@ pub(crate) mod curve;
 pub(crate) mod options;
 pub(crate) mod prepared;
 pub(crate) mod recorder;
+pub(crate) mod replay;
 pub(crate) mod row;
 pub(crate) mod watch;

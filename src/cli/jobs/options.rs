@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::replay::Replay;
 use crate::cli::args::picture::PictureArgs;
 use crate::cli::files::destination::Destination;
 use crate::cli::terminal::Verbosity;
@@ -19,6 +20,8 @@ pub(crate) struct PictureOptions {
     pub outputs: Vec<Destination>,
     /// Everything that decides the mosaic, except its picture.
     pub settings: Arc<Settings>,
+    /// The script that decides the mosaic instead; `settings` are those of its end.
+    pub replay: Option<Arc<Replay>>,
     /// Longer side of the written picture in px; `None` writes it as evolved.
     pub output_long_side_px: Option<u32>,
     pub progress: ProgressKind,
@@ -37,6 +40,7 @@ impl PictureOptions {
             input: PathBuf::new(),
             outputs: Vec::new(),
             settings: Arc::new(args.settings()?),
+            replay: None,
             output_long_side_px: args.output_size.map(|px| values::side_px("--output-size", px)).transpose()?,
             progress: ProgressKind::None,
             verbosity,

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use super::curve::Curve;
 use super::options::PictureOptions;
+use super::replay::Replay;
 use super::row::Row;
 use super::watch::{Watch, Watchers};
 use crate::cli::files::destination::{self, Destination};
@@ -12,10 +13,10 @@ use crate::cli::files::outputs;
 use crate::cli::terminal::progress::Progress;
 use crate::cli::terminal::{self, Verbosity, milliseconds};
 use crate::cli::trace::TraceInstruments;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::evolve::{Ended, Ending};
 use crate::model::{Canvas, Painter};
-use crate::studio::{self, Device, Drawn, Job, Provenance, Provenances, finish};
+use crate::studio::{self, Device, Drawn, Job, Outlook, Picture, Provenance, Provenances, finish};
 
 /// A picture that is ready to be evolved.
 #[derive(Debug)]
@@ -24,6 +25,8 @@ pub(crate) struct Prepared {
     pub id: String,
     pub job: Job,
     pub provenances: Provenances,
+    /// The picture, if a script is followed.
+    picture: Option<Picture>,
     /// How long it took to read.
     pub load_time: Duration,
 }
@@ -62,14 +65,22 @@ impl Prepared {
     pub fn load(options: &PictureOptions, id: &str) -> Result<Self> {
         let began = Instant::now();
         let _span = options.tracer.span("load").tell("picture", id);
-        let job = {
-            let _span = options.tracer.span("decode");
-            Job::load(&options.input, &options.settings)?
+        let decoding = options.tracer.span("decode");
+        let (job, picture, told) = match &options.replay {
+            None => (Job::load(&options.input, &options.settings)?, None, None),
+            Some(replay) => {
+                let (picture, Outlook { job, provenances }) = replay.outlook(&options.input)?;
+                (job, Some(picture), Some(provenances))
+            }
         };
+        drop(decoding);
         let load_time = began.elapsed();
         let resized_px = options.resized_px(job.target.width_px(), job.target.height_px());
-        let provenances = Provenances::new(&options.settings, &job, resized_px);
-        Ok(Self { id: id.to_owned(), job, provenances, load_time })
+        let provenances = match told {
+            Some(told) => Provenances { picture: told.picture.resized(resized_px), ..told },
+            None => Provenances::new(&options.settings, &job, resized_px),
+        };
+        Ok(Self { id: id.to_owned(), job, provenances, picture, load_time })
     }
 
     /// The provenance of an output.
@@ -107,6 +118,9 @@ impl Prepared {
         keep: Keep,
     ) -> Evolution {
         let _span = options.tracer.span("evolve").tell("picture", self.id.as_str());
+        if let (Some(replay), Some(picture)) = (&options.replay, &self.picture) {
+            return self.follow(replay, picture, device, (options, watchers));
+        }
         let progress = Progress::new(options.progress, options.verbosity);
         let mut watch = Watch::begin(watchers, &options.settings, progress, self.job.evals_planned());
         let mut curve = (keep == Keep::Curve).then(|| Curve::new(self.job.evals_planned()));
@@ -116,17 +130,41 @@ impl Prepared {
         let evolved = studio::evolve(&self.job, device, observers, &mut instruments);
         let took = watch.finish();
         let stand_in = instruments.stand_in();
-        if let Some(reason) = stand_in.filter(|_| options.verbosity > Verbosity::Quiet) {
-            terminal::say(&format!("smalti: searching on the CPU, since {reason}"));
-        }
-        let draw = |ended| {
-            let mut painter = options.tracer.painter(device.open_painter()?);
-            let evolved = self.draw(options, ended, &mut *painter)?;
-            drop(painter);
-            device.check_validation()?;
-            Ok(Evolved { curve, ..evolved })
-        };
+        say_stand_in(options, stand_in);
+        let draw = |ended| Ok(Evolved { curve, ..self.draw_on(options, ended, device)? });
         Evolution { took, is_stand_in: stand_in.is_some(), outcome: evolved.and_then(draw) }
+    }
+
+    /// Follows a script, and draws its result. A signal leaves nothing: what the script says is whole, or nothing.
+    fn follow(
+        &self,
+        replay: &Replay,
+        picture: &Picture,
+        device: &Device,
+        (options, watchers): (&PictureOptions, &mut Watchers<'_>),
+    ) -> Evolution {
+        let progress = Progress::new(options.progress, options.verbosity);
+        let mut watch = Watch::begin(watchers, &options.settings, progress, replay.evals_planned(&self.job));
+        let followed = replay.follow(picture, device, &mut |session| watch.goes_on(|| session.stage_in_all()));
+        let took = watch.finish();
+        let mut is_stand_in = false;
+        let ended = followed.and_then(|session| {
+            let mut session = session.ok_or(Error::Interrupted)?;
+            is_stand_in = session.stand_in().is_some();
+            say_stand_in(options, session.stand_in());
+            session.ended()
+        });
+        let outcome = ended.and_then(|ended| self.draw_on(options, ended, device));
+        Evolution { took, is_stand_in, outcome }
+    }
+
+    /// Draws the result of an evolution on a device.
+    fn draw_on(&self, options: &PictureOptions, ended: Ended, device: &Device) -> Result<Evolved> {
+        let mut painter = options.tracer.painter(device.open_painter()?);
+        let evolved = self.draw(options, ended, &mut *painter)?;
+        drop(painter);
+        device.check_validation()?;
+        Ok(evolved)
     }
 
     /// Draws the result of an evolution.
@@ -138,6 +176,13 @@ impl Prepared {
         let progress = Progress::new(options.progress, options.verbosity);
         outputs::draw(&mut finished.drawn, painter, destination::pieces(&options.outputs), progress)?;
         Ok(Evolved { ending: finished.ending, psnr_db: finished.psnr_db, drawn: finished.drawn, curve: None })
+    }
+}
+
+/// Says that the CPU searched in the place of the device, if it did.
+fn say_stand_in(options: &PictureOptions, reason: Option<&str>) {
+    if let Some(reason) = reason.filter(|_| options.verbosity > Verbosity::Quiet) {
+        terminal::say(&format!("smalti: searching on the CPU, since {reason}"));
     }
 }
 

@@ -7,7 +7,7 @@ use super::recorder::Recorder;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::progress::{EvolutionProgress, Measure, Progress};
 use crate::error::Result;
-use crate::evolve::{Brake, Observer, Seen, StopReason};
+use crate::evolve::{Brake, Observer, Seen, Stage, StopReason};
 use crate::studio::{Scheme, Settings};
 
 /// The aimed-at time between two looks at the clock. After a shorter time the next look comes later, after a longer one
@@ -65,8 +65,25 @@ impl<'a> Watch<'a> {
         self.began.elapsed()
     }
 
+    /// Whether work whose stage is `stage` goes on, which asks after every step.
+    pub fn goes_on(&mut self, stage: impl FnOnce() -> Stage) -> bool {
+        self.after_step(stage).is_none()
+    }
+
+    /// Why the work ends here, if it does; looks at the clock now and then.
+    fn after_step(&mut self, stage: impl FnOnce() -> Stage) -> Option<StopReason> {
+        if self.interrupt.is_requested() {
+            return Some(StopReason::Interrupted);
+        }
+        if self.until_look > 0 {
+            self.until_look -= 1;
+            return None;
+        }
+        self.look(stage)
+    }
+
     /// Looks at the clock. A returned reason ends the evolution.
-    fn look(&mut self, seen: &Seen<'_>) -> Option<StopReason> {
+    fn look(&mut self, stage: impl FnOnce() -> Stage) -> Option<StopReason> {
         let elapsed = self.began.elapsed();
         let since_last = elapsed - self.last_look;
         self.stride =
@@ -74,7 +91,7 @@ impl<'a> Watch<'a> {
         self.until_look = self.stride - 1;
         self.last_look = elapsed;
         if self.progress.is_due(elapsed) {
-            let stage = seen.stage();
+            let stage = stage();
             self.progress.show(&EvolutionProgress {
                 elapsed,
                 unit: self.unit,
@@ -111,14 +128,7 @@ impl Observer for Watch<'_> {
     }
 
     fn after_epoch(&mut self, seen: &mut Seen<'_>) -> Result<Option<StopReason>> {
-        if self.interrupt.is_requested() {
-            return Ok(Some(StopReason::Interrupted));
-        }
-        if self.until_look > 0 {
-            self.until_look -= 1;
-            return Ok(None);
-        }
-        Ok(self.look(seen))
+        Ok(self.after_step(|| seen.stage()))
     }
 
     fn at_end(&mut self, seen: &mut Seen<'_>) -> Result<()> {

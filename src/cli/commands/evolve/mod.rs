@@ -34,6 +34,8 @@ use crate::studio::{Device, Job, LONG_SIDE_PX, Provenance, picture_metadata, wit
 pub(crate) fn evolve(args: &EvolveArgs) -> ExitCode {
     let mut row = Row::new(&args.input, args.picture.seed, args.picture.scheme());
     let done = EvolveOptions::new(args).and_then(|options| {
+        // A script may ask for others than the flags.
+        (row.seed, row.scheme) = (options.picture.seed(), options.picture.scheme().word());
         let run = Run { options, interrupt: Interrupt::listen()?, row: &mut row };
         run.evolve_traced(&args.trace)
     });
@@ -272,7 +274,9 @@ fn say_notes(job: &Job, options: &PictureOptions, device: &Device) {
     }
     let longer_px = job.original_size_px.0.max(job.original_size_px.1);
     let asked_px = options.settings.long_side_px;
-    if asked_px > longer_px && u64::from(asked_px) != LONG_SIDE_PX {
+    let note = options.replay.as_ref().and_then(|replay| replay.note(&options.input, &job.input_sha256));
+    note.iter().for_each(|note| terminal::say(&format!("smalti: {note}")));
+    if options.replay.is_none() && asked_px > longer_px && u64::from(asked_px) != LONG_SIDE_PX {
         terminal::say(&format!(
             "smalti: --size {asked_px} changes nothing, since the longer side of {} has {longer_px} px; --output-size {asked_px} draws the \
              mosaic larger",

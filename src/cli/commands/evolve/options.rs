@@ -1,6 +1,7 @@
 //! The options of `smalti evolve`.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 
@@ -11,9 +12,11 @@ use crate::cli::files::curve_file::CurveFile;
 use crate::cli::files::destination::{self, Destination, Overwrite};
 use crate::cli::files::snapshots::SaveRun;
 use crate::cli::jobs::options::PictureOptions;
+use crate::cli::jobs::replay::Replay;
 use crate::cli::trace::TraceArgs;
 use crate::cli::values;
 use crate::error::Result;
+use crate::photo::CutShort;
 use crate::vk::Validation;
 
 const EVOLVE_EXAMPLES: &str = "\
@@ -25,6 +28,50 @@ Examples:
   smalti evolve photo.jpg -o poster.png --output-size 4096 --time 2m
   smalti evolve photo.jpg -o better.png --init flies.npz --seed 1
   smalti evolve photo.jpg -o - --quiet > mosaic.png";
+
+/// What a script decides, or what cannot be told of one that is followed.
+const NOT_WITH_REPLAY: [&str; 40] = [
+    "tiles",
+    "size",
+    "colors",
+    "palette",
+    "background",
+    "weight",
+    "init",
+    "masks",
+    "shader",
+    "blend",
+    "opacity",
+    "scheme",
+    "preset",
+    "color_mode",
+    "target_sae",
+    "patience",
+    "time",
+    "seed",
+    "style",
+    "evals",
+    "candidates",
+    "grout",
+    "grout_width",
+    "births",
+    "batch_births",
+    "restarts",
+    "restart_masks",
+    "cool",
+    "on_dry",
+    "p_mutation",
+    "p_crossover",
+    "new_blood",
+    "mitosis",
+    "no_rotation",
+    "tile_scale",
+    "curves",
+    "save_run",
+    "save_target",
+    "trace",
+    "capture",
+];
 
 #[derive(Clone, Debug, Args)]
 #[command(after_long_help = EVOLVE_EXAMPLES)]
@@ -38,6 +85,9 @@ pub(crate) struct EvolveArgs {
     /// .npz, .csv and .json hold the tiles themselves; smalti render draws a .npz again. - writes a PNG to stdout.
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
+    /// Do again what was done in the window: the script that it saved decides all but the picture and the outputs
+    #[arg(long, value_name = "SCRIPT", conflicts_with_all = NOT_WITH_REPLAY, help_heading = "Picture")]
+    pub replay: Option<PathBuf>,
     /// Also write the picture that the mosaic imitates, at the size at which it evolves, as a PNG
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_target: Option<PathBuf>,
@@ -117,12 +167,18 @@ impl EvolveOptions {
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
         };
         let computing = args.computing.check(validation)?;
-        let picture = PictureOptions {
+        let mut picture = PictureOptions {
             input: args.input.clone(),
             outputs,
             progress: args.messages.progress.unless(args.messages.quiet),
             ..PictureOptions::new(&args.picture, args.messages.verbosity())?
         };
+        if let Some(path) = &args.replay {
+            let cut_short = if args.picture.lenient { CutShort::Take } else { CutShort::Refuse };
+            let replay = Replay::read(path, cut_short)?;
+            picture.settings = Arc::new(replay.settings()?);
+            picture.replay = Some(Arc::new(replay));
+        }
         if args.json {
             destination::check_stdout_is_free(&picture.outputs)?;
         }
@@ -139,5 +195,24 @@ impl EvolveOptions {
     pub fn files_written(&self) -> impl Iterator<Item = &Path> {
         let curves = self.files.curves.iter().map(|file| file.path.as_path());
         self.destinations().map(|destination| destination.path.as_path()).chain(curves)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Args, Command};
+
+    use super::*;
+
+    #[test]
+    fn a_script_decides_all_that_flags_decide_of_a_picture() {
+        let of_picture = PictureArgs::augment_args(Command::new("picture"));
+        let of_evolve = EvolveArgs::augment_args(Command::new("evolve"));
+        let ids = |command: &Command| command.get_arguments().map(|argument| argument.get_id().to_string());
+        for id in ids(&of_picture).filter(|id| !["output_size", "lenient"].contains(&id.as_str())) {
+            assert!(NOT_WITH_REPLAY.contains(&id.as_str()), "{id} is ignored");
+        }
+        let known: Vec<String> = ids(&of_evolve).collect();
+        assert!(NOT_WITH_REPLAY.iter().all(|id| known.iter().any(|known| known == id)), "{known:?}");
     }
 }

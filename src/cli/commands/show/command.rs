@@ -43,6 +43,13 @@ pub(super) fn again(path: &Path, told: &Map<String, Value>, input: Option<&Path>
         }
     };
     match content {
+        "mosaic" | "painting" if is_of_script(told) => {
+            evolved(&mut again);
+            let kept = recipe.iter().filter(|(name, _)| ["output-size", "lenient"].contains(&name.as_str()));
+            let flags = again.flags(&kept.map(|(name, value)| (name.clone(), value.clone())).collect(), &Map::new());
+            again.commands.push(format!("smalti evolve {} --replay SCRIPT -o {output}{flags}", picture()));
+            again.needs.push(("SCRIPT".to_owned(), script_told(told)));
+        }
         "mosaic" | "painting" => {
             evolved(&mut again);
             let flags = again.flags(recipe, told);
@@ -70,13 +77,31 @@ pub(super) fn again(path: &Path, told: &Map<String, Value>, input: Option<&Path>
         }
         _ => return None,
     }
-    if told.contains_key("changes") {
-        again.differs = Some("A program changed what it asked for on the way, which no command does.");
-    } else if told.contains_key("video_algorithm") {
+    if told.contains_key("video_algorithm") {
         again.differs =
             Some("It is a frame of a sequence that goes on from the frame before, as smalti video makes it.");
     }
     Some(again)
+}
+
+/// Whether it was steered on its way, or ended before its budget was spent, as scripts tell.
+fn is_of_script(told: &Map<String, Value>) -> bool {
+    told.contains_key("changes") || told.contains_key("until")
+}
+
+/// Which script it was.
+fn script_told(told: &Map<String, Value>) -> String {
+    let number = |value: Option<&Value>| value.and_then(Value::as_u64);
+    let changes = number(told.get("changes").and_then(|changes| changes.get("count")));
+    let changes = changes.map(|count| if count == 1 { "1 change".to_owned() } else { format!("{count} changes") });
+    let until = number(told.get("until")).map(|evals| format!("ends after {evals} evals"));
+    let told = match (changes, until) {
+        (Some(changes), Some(until)) => format!(": it has {changes} and {until}"),
+        (Some(changes), None) => format!(": it has {changes}"),
+        (None, Some(until)) => format!(": it {until}"),
+        (None, None) => String::new(),
+    };
+    format!("the script that was saved with it{told}")
 }
 
 /// Whether the clock or a signal ended it.
