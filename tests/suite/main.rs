@@ -49,6 +49,7 @@ mod places;
 mod printed_commands;
 mod reference;
 mod render;
+mod replay;
 mod scenarios;
 mod schemes;
 mod score;
