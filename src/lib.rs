@@ -28,6 +28,7 @@
 //! | get tiles, pixels and files | [`Mosaic`], [`Tile`], [`Image`] |
 //! | make many pictures on one device | [`make_all`] |
 //! | go step by step, and change the recipe on the way | [`Session`] |
+//! | keep such steps in a file, and make the same bytes again | [`Script`] of [`Step`]s, each with a [`WrittenRecipe`] |
 //! | go on from earlier tiles | [`Population`] and [`Recipe::init`] |
 //! | know what went wrong | [`Error`] |
 //!
@@ -94,4 +95,7 @@ pub use model::{Backdrop, Blend, Fly, Grout, MaskSet, Population, Rgb};
 #[doc(inline)]
 pub use shapes::Shader;
 #[doc(inline)]
-pub use studio::{Device, GroutColor, Image, Mask, Mosaic, Picture, Progress, Recipe, Scheme, Session, Tile, make_all};
+pub use studio::{
+    CarriedMask, Device, GroutColor, Image, Mask, MaskKind, Mosaic, Picture, Progress, Recipe, Scheme, Script, Session,
+    Step, Tile, WrittenBounds, WrittenClass, WrittenMask, WrittenRecipe, make_all,
+};

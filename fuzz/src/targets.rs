@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 use smalti::model::Canvas;
 use smalti::photo::{self, Background, CutShort, ReadOptions};
 use smalti::shapes::{self, Outfit, Wardrobe};
-use smalti::{Blend, Device, Mask, Mosaic, Picture, Recipe, Shader, archive, cli, vector};
+use smalti::{Blend, Device, Mask, Mosaic, Picture, Recipe, Script, Shader, archive, cli, vector};
 
 use crate::scratch::{folder, with_file};
 
@@ -23,13 +23,14 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [Target; 10] = [
     Target { name: "picture", read: picture, reads_photos: true },
     Target { name: "mask", read: mask, reads_photos: true },
     Target { name: "palette", read: palette, reads_photos: false },
     Target { name: "weight", read: weight, reads_photos: true },
     Target { name: "npz", read: npz, reads_photos: false },
     Target { name: "preset", read: preset, reads_photos: false },
+    Target { name: "script", read: script, reads_photos: false },
     Target { name: "manifest", read: manifest, reads_photos: false },
     Target { name: "config", read: config, reads_photos: false },
     Target { name: "svg", read: svg, reads_photos: false },
@@ -164,6 +165,17 @@ pub fn preset(data: &[u8]) -> bool {
     };
     made(recipe, &PICTURE);
     from_file.is_ok()
+}
+
+/// A script that is read, written again, and followed as far as its first recipe goes.
+pub fn script(data: &[u8]) -> bool {
+    let Ok(script) = Script::read(data) else { return false };
+    let written = script.write().expect("what is read can be written");
+    assert_eq!(Script::read(&written).expect("what is written can be read"), script);
+    if let Some(recipe) = script.steps.first().and_then(|step| step.recipe.recipe().ok()) {
+        made(recipe, &PICTURE);
+    }
+    true
 }
 
 fn checked(words: &[&str], path: &Path) -> bool {

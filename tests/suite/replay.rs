@@ -2,8 +2,10 @@
 
 use std::fs;
 
-use smalti::studio::{CarriedMask, MaskKind, Script, Step, WrittenBounds, WrittenClass, WrittenMask, WrittenRecipe};
-use smalti::{Device, Mosaic, Picture, Session, StopReason};
+use smalti::{
+    CarriedMask, Device, MaskKind, Mosaic, Picture, Script, Session, Step, StopReason, WrittenBounds, WrittenClass,
+    WrittenMask, WrittenRecipe,
+};
 
 use crate::cli_interrupts::interrupted;
 use crate::cli_refusals::refused;
