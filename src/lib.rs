@@ -28,7 +28,7 @@
 //! | get tiles, pixels and files | [`Mosaic`], [`Tile`], [`Image`] |
 //! | make many pictures on one device | [`make_all`] |
 //! | go step by step, and change the recipe on the way | [`Session`] |
-//! | keep such steps in a file, and make the same bytes again | [`Script`] of [`Step`]s, each with a [`WrittenRecipe`] |
+//! | keep such steps in a file, and repeat them | [`Script`] of [`Step`]s, each with a [`WrittenRecipe`] |
 //! | go on from earlier tiles | [`Population`] and [`Recipe::init`] |
 //! | know what went wrong | [`Error`] |
 //!

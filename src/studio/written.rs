@@ -271,28 +271,28 @@ impl WrittenRecipe {
         let masks = self.masks.iter().map(name).collect::<Option<Vec<String>>>()?;
         let number = |value: Option<u64>| value.map(|value| value.to_string());
         let flags = [
-            ("--scheme", self.scheme.clone()),
-            ("--style", self.style.clone()),
-            ("-n", number(self.tiles)),
-            ("--size", number(self.size)),
-            ("--seed", number(self.seed)),
-            ("--evals", number(self.evals)),
-            ("--births", number(self.births)),
-            ("--restarts", number(self.restarts)),
-            ("--candidates", number(self.candidates)),
-            ("--patience", number(self.patience)),
-            ("--target-sae", number(self.target_sae)),
-            ("--colors", number(self.colors)),
-            ("--color-mode", self.color_mode.clone()),
-            ("--background", self.background.clone()),
-            ("--mask", (!masks.is_empty()).then(|| masks.join(","))),
-            ("--shader", self.shader.clone()),
-            ("--blend", self.blend.clone()),
-            ("--opacity", self.opacity.map(|opacity| opacity.to_string())),
-            ("--grout", self.grout.clone()),
-            ("--grout-width", self.grout_width.map(|width| width.to_string())),
+            ("scheme", self.scheme.clone()),
+            ("style", self.style.clone()),
+            ("tiles", number(self.tiles)),
+            ("size", number(self.size)),
+            ("seed", number(self.seed)),
+            ("evals", number(self.evals)),
+            ("births", number(self.births)),
+            ("restarts", number(self.restarts)),
+            ("candidates", number(self.candidates)),
+            ("patience", number(self.patience)),
+            ("target-sae", number(self.target_sae)),
+            ("colors", number(self.colors)),
+            ("color-mode", self.color_mode.clone()),
+            ("background", self.background.clone()),
+            ("mask", (!masks.is_empty()).then(|| masks.join(","))),
+            ("shader", self.shader.clone()),
+            ("blend", self.blend.clone()),
+            ("opacity", self.opacity.map(|opacity| opacity.to_string())),
+            ("grout", self.grout.clone()),
+            ("grout-width", self.grout_width.map(|width| width.to_string())),
         ];
-        let set = flags.into_iter().filter_map(|(flag, value)| Some([flag.to_owned(), value?]));
+        let set = flags.into_iter().filter_map(|(flag, value)| Some([format!("--{flag}"), value?]));
         Some(set.flatten().collect())
     }
 

@@ -20,7 +20,7 @@ pub(crate) fn encode(bytes: &[u8]) -> String {
 /// The bytes of padded base64 in one line; none if it is not that.
 pub(crate) fn decode(text: &str) -> Option<Vec<u8>> {
     let mut digits = text.as_bytes();
-    if digits.len() % 4 != 0 {
+    if !digits.len().is_multiple_of(4) {
         return None;
     }
     for _ in 0..2 {

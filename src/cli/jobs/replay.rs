@@ -1,5 +1,5 @@
-//! The script of `--replay`, read from its file and followed in the place of a search. What is wrong with it is told with
-//! the name of the file.
+//! The script of `--replay`, read from its file and followed in the place of a search. What is wrong with it is told
+//! with the name of the file.
 
 use std::path::{Path, PathBuf};
 

@@ -208,11 +208,13 @@ mod tests {
     fn a_script_decides_all_that_flags_decide_of_a_picture() {
         let of_picture = PictureArgs::augment_args(Command::new("picture"));
         let of_evolve = EvolveArgs::augment_args(Command::new("evolve"));
-        let ids = |command: &Command| command.get_arguments().map(|argument| argument.get_id().to_string());
-        for id in ids(&of_picture).filter(|id| !["output_size", "lenient"].contains(&id.as_str())) {
+        let ids = |command: &Command| -> Vec<String> {
+            command.get_arguments().map(|argument| argument.get_id().to_string()).collect()
+        };
+        for id in ids(&of_picture).iter().filter(|id| !["output_size", "lenient"].contains(&id.as_str())) {
             assert!(NOT_WITH_REPLAY.contains(&id.as_str()), "{id} is ignored");
         }
-        let known: Vec<String> = ids(&of_evolve).collect();
+        let known = ids(&of_evolve);
         assert!(NOT_WITH_REPLAY.iter().all(|id| known.iter().any(|known| known == id)), "{known:?}");
     }
 }
