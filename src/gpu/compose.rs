@@ -1,5 +1,6 @@
 //! The compute pass `compose`: draws translucent tiles patch by patch, by the rule of the fitness; the blending of a
-//! graphics pass rounds as the device likes. Twin: `cpu/mosaic.rs`.
+//! graphics pass rounds as the device likes. What it draws with serves a whole mosaic, and the picture of a mosaic at
+//! work (`live`). Twin: `cpu/mosaic.rs`.
 
 use std::sync::Arc;
 
@@ -15,25 +16,16 @@ use crate::vk::{
 };
 
 /// Samples along each side of a patch.
-const PATCH_SIDE: u32 = 1024;
+pub(super) const PATCH_SIDE: u32 = 1024;
 /// List entries of one submission: well below a watchdog's second.
 const ENTRIES_PER_SUBMISSION: usize = 1 << 18;
 
-/// Pipeline, tiles and buffers of one population on one canvas of samples.
+/// Tiles of one population on one canvas of samples, and what draws them.
 pub(super) struct ComposePass {
     samples: Canvas,
-    shape: KernelShape,
-    background: Backdrop,
     tiles: Vec<Tile>,
     lists: BlockLists,
-    items: Vec<ComposeItem>,
-    entries: Vec<u32>,
-    item_buffer: Arc<Buffer>,
-    entry_buffer: Arc<Buffer>,
-    colors: Arc<Buffer>,
-    pipeline: Arc<ComputePipeline>,
-    group: Arc<BindingGroup>,
-    workgroups_per_row: usize,
+    glazer: Glazer,
 }
 
 impl ComposePass {
@@ -46,40 +38,16 @@ impl ComposePass {
         supersampling: u32,
     ) -> Result<Self> {
         let samples = canvas.supersampled(supersampling);
-        let shape = KernelShape::for_device(device.info().kind);
         let tiles: Vec<Tile> = population.flies.iter().map(|fly| Tile::bake(fly, &samples)).collect();
         let side = PATCH_SIDE / supersampling * supersampling;
         let mut lists = BlockLists::new(&samples, side);
         lists.fill(&population.flies, &tiles);
-        let block_count = (side.div_ceil(shape.block_side_px) as usize).pow(2);
-        let storage = |name: &str, bytes: usize| {
-            Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
-        };
-        let item_buffer = storage("compose work", block_count * size_of::<ComposeItem>())?;
-        let entry_buffer = storage("compose entries", ENTRIES_PER_SUBMISSION * 4)?;
-        let tile_buffer = storage("compose tiles", tiles.len() * size_of::<Tile>())?;
-        let states = storage("compose states", shape.block_pixels() * 16)?;
-        let colors = storage("compose colours", block_count * shape.block_pixels() * 4)?;
+        let tile_bytes = (tiles.len() * size_of::<Tile>()) as u64;
+        let tile_buffer = Buffer::create(device, "compose tiles", tile_bytes, BufferUse::Storage, Residence::Device)?;
         recorder.write_buffer(&tile_buffer, 0, bytemuck::cast_slice(&tiles))?;
         let masks = create_mask_buffer(device, recorder, std::iter::once(&population.masks))?;
-        let pipeline = create_pipeline(device, shape, population.background)?;
-        let bindings = [&item_buffer, &entry_buffer, &tile_buffer, &states, &colors, &masks].map(Binding::Buffer);
-        let group = BindingGroup::create("compose", pipeline.layout(), &bindings)?;
-        Ok(Self {
-            samples,
-            shape,
-            background: population.background,
-            tiles,
-            lists,
-            items: Vec::new(),
-            entries: Vec::new(),
-            item_buffer,
-            entry_buffer,
-            colors,
-            pipeline,
-            group,
-            workgroups_per_row: device.info().limits.workgroups[0] as usize,
-        })
+        let glazer = Glazer::create(device, side, population.background, &tile_buffer, &masks)?;
+        Ok(Self { samples, tiles, lists, glazer })
     }
 
     /// Draws on the canvas, each pixel the mean of `supersampling`² samples.
@@ -90,30 +58,113 @@ impl ComposePass {
         supersampling: u32,
         watch: &mut dyn FnMut(f64),
     ) -> Result<Mosaic> {
-        let mut mosaic = Mosaic::new(canvas, self.background);
+        let mut mosaic = Mosaic::new(canvas, self.glazer.background);
         for number in 0..self.lists.block_count() {
             let patch = self.lists.patch(number, &self.samples);
-            let colors = self.draw_patch(recorder, number, &patch)?;
+            let colors = self.glazer.draw(recorder, &self.tiles, self.lists.list(number), &patch)?;
             mosaic.absorb(&patch, &colors, supersampling);
             watch((number + 1) as f64 / self.lists.block_count() as f64);
         }
         Ok(mosaic)
     }
+}
 
-    /// Packed colours of a patch, row by row, with their opacity in the highest byte if the backdrop is transparent.
-    fn draw_patch(&mut self, recorder: &mut Recorder, number: usize, patch: &Patch) -> Result<Vec<u32>> {
+/// Pipeline and buffers for one patch after the other. The tiles and masks are the caller's.
+pub(super) struct Glazer {
+    shape: KernelShape,
+    background: Backdrop,
+    items: Vec<ComposeItem>,
+    entries: Vec<u32>,
+    buffers: PatchBuffers,
+    pipeline: Arc<ComputePipeline>,
+    group: Arc<BindingGroup>,
+    workgroups_per_row: usize,
+}
+
+/// What the work on a patch needs.
+struct PatchBuffers {
+    items: Arc<Buffer>,
+    entries: Arc<Buffer>,
+    states: Arc<Buffer>,
+    colors: Arc<Buffer>,
+}
+
+impl PatchBuffers {
+    fn create(device: &Arc<Device>, shape: KernelShape, side_px: u32) -> Result<Self> {
+        let block_count = (side_px.div_ceil(shape.block_side_px) as usize).pow(2);
+        let storage = |name: &str, bytes: usize| {
+            Buffer::create(device, name, bytes as u64, BufferUse::Storage, Residence::Device)
+        };
+        Ok(Self {
+            items: storage("compose work", block_count * size_of::<ComposeItem>())?,
+            entries: storage("compose entries", ENTRIES_PER_SUBMISSION * 4)?,
+            states: storage("compose states", shape.block_pixels() * 16)?,
+            colors: storage("compose colours", block_count * shape.block_pixels() * 4)?,
+        })
+    }
+
+    fn bind(&self, pipeline: &ComputePipeline, tiles: &Arc<Buffer>, masks: &Arc<Buffer>) -> Result<Arc<BindingGroup>> {
+        let Self { items, entries, states, colors } = self;
+        let bindings = [items, entries, tiles, states, colors, masks].map(Binding::Buffer);
+        BindingGroup::create("compose", pipeline.layout(), &bindings)
+    }
+}
+
+impl Glazer {
+    /// Makes room for patches of up to `side_px` samples along each side.
+    pub fn create(
+        device: &Arc<Device>,
+        side_px: u32,
+        background: Backdrop,
+        tiles: &Arc<Buffer>,
+        masks: &Arc<Buffer>,
+    ) -> Result<Self> {
+        let shape = KernelShape::for_device(device.info().kind);
+        let buffers = PatchBuffers::create(device, shape, side_px)?;
+        let pipeline = create_pipeline(device, shape, background)?;
+        Ok(Self {
+            shape,
+            background,
+            items: Vec::new(),
+            entries: Vec::new(),
+            group: buffers.bind(&pipeline, tiles, masks)?,
+            buffers,
+            pipeline,
+            workgroups_per_row: device.info().limits.workgroups[0] as usize,
+        })
+    }
+
+    /// Takes other tiles and masks.
+    pub fn bind(&mut self, tiles: &Arc<Buffer>, masks: &Arc<Buffer>) -> Result<()> {
+        self.group = self.buffers.bind(&self.pipeline, tiles, masks)?;
+        Ok(())
+    }
+
+    /// Takes another background. The shader is compiled again only if one of the two is transparent.
+    pub fn put_on(&mut self, device: &Arc<Device>, background: Backdrop) -> Result<()> {
+        let is_transparent = |backdrop| backdrop == Backdrop::Transparent;
+        if is_transparent(background) != is_transparent(self.background) {
+            self.pipeline = create_pipeline(device, self.shape, background)?;
+        }
+        self.background = background;
+        Ok(())
+    }
+
+    /// Draws a patch and runs that: its packed colours, row by row, with their opacity in the highest byte if the
+    /// backdrop is transparent. `list` are the depth keys of the tiles that touch the patch, nearest first.
+    pub fn draw(&mut self, recorder: &mut Recorder, tiles: &[Tile], list: &[u64], patch: &Patch) -> Result<Vec<u32>> {
         let side = self.shape.block_side_px;
         let columns = patch.width_px.div_ceil(side);
         let rows = patch.height_px.div_ceil(side);
         for row in 0..rows {
-            for (column, list) in (0..).zip(self.lists_of_row(number, patch, row)) {
+            for (column, list) in (0..).zip(self.lists_of_row(tiles, list, patch, row)) {
                 let place = (patch.x + column * side, patch.y + row * side);
                 self.add_block(recorder, row * columns + column, place, &list)?;
             }
         }
         let bytes = columns as usize * rows as usize * self.shape.block_pixels() * 4;
         self.record(recorder)?;
-        let ticket = recorder.read_buffer(&self.colors, 0, bytes as u64)?;
+        let ticket = recorder.read_buffer(&self.buffers.colors, 0, bytes as u64)?;
         recorder.submit_and_wait()?;
         let mut blocked = vec![0_u32; bytes / 4];
         recorder.read_into(&ticket, bytemuck::cast_slice_mut(&mut blocked))?;
@@ -127,12 +178,12 @@ impl ComposePass {
 
     /// The flies that touch each block in a row of blocks of a patch, nearest first. It is done row by row to save
     /// memory: a tile as large as the patch is in the lists of all of its blocks.
-    fn lists_of_row(&self, number: usize, patch: &Patch, row: u32) -> Vec<Vec<u32>> {
+    fn lists_of_row(&self, tiles: &[Tile], list: &[u64], patch: &Patch, row: u32) -> Vec<Vec<u32>> {
         let side = self.shape.block_side_px as i32;
         let (left, top) = (patch.x as i32, (patch.y + row * self.shape.block_side_px) as i32);
         let mut lists = vec![Vec::new(); patch.width_px.div_ceil(side as u32) as usize];
-        for &key in self.lists.list(number) {
-            let tile = &self.tiles[index_of(key) as usize];
+        for &key in list {
+            let tile = &tiles[index_of(key) as usize];
             if tile.y0 < top + side && tile.y1 >= top {
                 let first = (tile.x0 - left).max(0) / side;
                 let last = ((tile.x1 - left) / side).min(lists.len() as i32 - 1);
@@ -185,8 +236,8 @@ impl ComposePass {
         if self.items.is_empty() {
             return Ok(());
         }
-        recorder.write_buffer(&self.item_buffer, 0, bytemuck::cast_slice(&self.items))?;
-        recorder.write_buffer(&self.entry_buffer, 0, bytemuck::cast_slice(&self.entries))?;
+        recorder.write_buffer(&self.buffers.items, 0, bytemuck::cast_slice(&self.items))?;
+        recorder.write_buffer(&self.buffers.entries, 0, bytemuck::cast_slice(&self.entries))?;
         let mut pass = recorder.compute_pass("compose")?;
         pass.bind(&self.pipeline, &self.group);
         let push = ComposePush { item_count: self.items.len() as u32, background: pack(self.background.color()) };

@@ -147,7 +147,7 @@ pub struct Instance {
     pub centre: [f32; 2],
     /// Index of the fly, and of its tile.
     pub fly: u32,
-    /// Place in the depth order; 0 is nearest.
+    /// Depth, below 2^24; 0 is nearest. Of two at the same depth, the one that is drawn first is nearer.
     pub rank: u32,
 }
 

@@ -1,5 +1,6 @@
-//! The graphics pass `mosaic`: instanced quads with a transform and a mask each, drawn patch by patch into colour, fly
-//! and depth. Twin: `cpu/mosaic.rs`.
+//! The graphics pass `mosaic`: instanced quads with a transform and a mask each, drawn into colour, fly and depth. What
+//! it draws with serves a whole mosaic, patch by patch, and the picture of a mosaic at work (`live`). Twin:
+//! `cpu/mosaic.rs`.
 
 use std::sync::Arc;
 
@@ -8,7 +9,7 @@ use glam::{DAffine2, DMat2, DVec2};
 use super::layout::{Instance, MosaicPush, Tile};
 use super::shaders;
 use crate::error::Result;
-use crate::model::blocks::{BlockLists, depth_order, index_of};
+use crate::model::blocks::{BlockLists, index_of};
 use crate::model::mask::MASK_SIDE;
 use crate::model::tile::pack;
 use crate::model::{Backdrop, Canvas, Fly, Grout, MaskSet, Mosaic, NO_FLY, Patch, Population};
@@ -23,14 +24,10 @@ const PATCH_SIDE: u32 = 2048;
 /// Pipeline, attachments and tiles of one population on one canvas of samples.
 pub(super) struct MosaicPass {
     samples: Canvas,
-    background: Backdrop,
-    grout: Option<Grout>,
     tiles: Vec<Tile>,
-    ranks: Vec<u32>,
     flies: Vec<Fly>,
     instances: Arc<Buffer>,
-    pipeline: Arc<GraphicsPipeline>,
-    group: Arc<BindingGroup>,
+    brush: Brush,
     color: Arc<Image>,
     fly: Arc<Image>,
     depth: Arc<Image>,
@@ -54,22 +51,17 @@ impl MosaicPass {
         recorder.write_buffer(&tile_buffer, 0, bytemuck::cast_slice(&tiles))?;
         let instances = storage("mosaic instances", tiles.len() * size_of::<Instance>())?;
         let masks = create_masks(device, recorder, &population.masks)?;
-        let pipeline = create_pipeline(device, population.grout)?;
-        let bindings = [Binding::Buffer(&tile_buffer), Binding::Buffer(&instances), Binding::SampledImage(&masks)];
+        let pipeline = create_pipeline(device, population.grout, &[ImageFormat::Rgba8Unorm, ImageFormat::R32Uint])?;
         let side = PATCH_SIDE.min(device.info().limits.image_side_px);
         let shape =
             ImageShape { width_px: side.min(samples.width_px), height_px: side.min(samples.height_px), layers: 1 };
-        let group = BindingGroup::create("mosaic", pipeline.layout(), &bindings)?;
+        let group = bind(&pipeline, &tile_buffer, &instances, &masks)?;
         Ok(Self {
             samples: *samples,
-            background: population.background,
-            grout: population.grout,
-            ranks: ranks(population),
             flies: population.flies.clone(),
             tiles,
             instances,
-            group,
-            pipeline,
+            brush: Brush { pipeline, group, background: population.background, grout: population.grout },
             color: Image::create(device, "mosaic colour", ImageFormat::Rgba8Unorm, shape)?,
             fly: Image::create(device, "mosaic fly", ImageFormat::R32Uint, shape)?,
             depth: Image::create(device, "mosaic depth", ImageFormat::D32Float, shape)?,
@@ -84,7 +76,7 @@ impl MosaicPass {
         supersampling: u32,
         watch: &mut dyn FnMut(f64),
     ) -> Result<Mosaic> {
-        let mut mosaic = Mosaic::new(canvas, self.background);
+        let mut mosaic = Mosaic::new(canvas, self.brush.background);
         let color = Arc::clone(&self.color);
         self.draw_patches(recorder, supersampling, &color, |patch, samples, share| {
             mosaic.absorb(patch, samples, supersampling);
@@ -136,45 +128,74 @@ impl MosaicPass {
 
     /// Records the drawing of one patch, nearest tiles first.
     fn record(&self, recorder: &mut Recorder, patch: &Patch, list: &[u64]) -> Result<()> {
-        let instances: Vec<Instance> = list.iter().map(|&key| self.instance(index_of(key))).collect();
+        let instances: Vec<Instance> = list
+            .iter()
+            .map(|&key| index_of(key))
+            .map(|fly| instance(fly, &self.flies[fly as usize], &self.tiles[fly as usize]))
+            .collect();
         recorder.write_buffer(&self.instances, 0, bytemuck::cast_slice(&instances))?;
-        let [r, g, b] = self.background.color().map(|channel| f32::from(channel) / 255.0);
-        let alpha = if self.background == Backdrop::Transparent { 0.0 } else { 1.0 };
-        let targets = RenderTargets {
-            colors: &[
-                ColorTarget { image: &self.color, clear: ClearColor::Float([r, g, b, alpha]) },
-                ColorTarget { image: &self.fly, clear: ClearColor::Uint([NO_FLY; 4]) },
-            ],
-            depth: Some(&self.depth),
-            width_px: patch.width_px,
-            height_px: patch.height_px,
-        };
+        let colors = [
+            ColorTarget { image: &self.color, clear: clear_color(self.brush.background) },
+            ColorTarget { image: &self.fly, clear: ClearColor::Uint([NO_FLY; 4]) },
+        ];
+        self.brush.record(recorder, &colors, &self.depth, patch, instances.len())
+    }
+}
+
+/// What tiles are drawn with, wherever they are drawn.
+pub(super) struct Brush {
+    pub pipeline: Arc<GraphicsPipeline>,
+    pub group: Arc<BindingGroup>,
+    pub background: Backdrop,
+    pub grout: Option<Grout>,
+}
+
+impl Brush {
+    /// Records the drawing of the first instances into the upper left corner of the targets: what of them lies on a
+    /// patch. Of two at the same depth, the first is nearer.
+    pub fn record(
+        &self,
+        recorder: &mut Recorder,
+        colors: &[ColorTarget<'_>],
+        depth: &Arc<Image>,
+        patch: &Patch,
+        instance_count: usize,
+    ) -> Result<()> {
+        let &Patch { x, y, width_px, height_px } = patch;
+        let targets = RenderTargets { colors, depth: Some(depth), width_px, height_px };
         let mut pass = recorder.render_pass("mosaic", &targets)?;
         pass.bind(&self.pipeline, &self.group);
         pass.push_constants(bytemuck::bytes_of(&MosaicPush {
-            origin: [patch.x as i32, patch.y as i32],
-            pixel_size: [2.0 / patch.width_px as f32, 2.0 / patch.height_px as f32],
+            origin: [x as i32, y as i32],
+            pixel_size: [2.0 / width_px as f32, 2.0 / height_px as f32],
             first_mask: 0,
             grout: self.grout.map_or(0, |grout| pack(grout.color)),
         }));
-        pass.draw(4, instances.len() as u32);
+        pass.draw(4, instance_count as u32);
         Ok(())
     }
+}
 
-    fn instance(&self, fly: u32) -> Instance {
-        let quad = quad_transform(&self.tiles[fly as usize]);
-        Instance {
-            axis_u: quad.matrix2.x_axis.as_vec2().to_array(),
-            axis_v: quad.matrix2.y_axis.as_vec2().to_array(),
-            centre: quad.translation.as_vec2().to_array(),
-            fly,
-            rank: self.ranks[fly as usize],
-        }
+/// What a picture holds where no tile is.
+pub(super) fn clear_color(background: Backdrop) -> ClearColor {
+    let [r, g, b] = background.color().map(|channel| f32::from(channel) / 255.0);
+    ClearColor::Float([r, g, b, if background == Backdrop::Transparent { 0.0 } else { 1.0 }])
+}
+
+/// The quad of a fly's tile, which is not empty. Its depth has 24 bits, as many as a rank.
+pub(super) fn instance(fly: u32, genes: &Fly, tile: &Tile) -> Instance {
+    let quad = quad_transform(tile);
+    Instance {
+        axis_u: quad.matrix2.x_axis.as_vec2().to_array(),
+        axis_v: quad.matrix2.y_axis.as_vec2().to_array(),
+        centre: quad.translation.as_vec2().to_array(),
+        fly,
+        rank: genes.z,
     }
 }
 
 /// All layers of a mask set as a texture array.
-fn create_masks(device: &Arc<Device>, recorder: &mut Recorder, set: &MaskSet) -> Result<Arc<Image>> {
+pub(super) fn create_masks(device: &Arc<Device>, recorder: &mut Recorder, set: &MaskSet) -> Result<Arc<Image>> {
     let side = MASK_SIDE as u32;
     let shape = ImageShape { width_px: side, height_px: side, layers: set.layers().len() as u32 };
     let image = Image::create(device, "masks", ImageFormat::Rg8Uint, shape)?;
@@ -199,16 +220,23 @@ fn quad_transform(tile: &Tile) -> DAffine2 {
     DAffine2::from_mat2_translation(to_px * DMat2::from_diagonal(half + DVec2::splat(scale)), centre)
 }
 
-/// Per fly its place in the depth order.
-fn ranks(population: &Population) -> Vec<u32> {
-    let mut ranks = vec![0; population.flies.len()];
-    for (rank, key) in (0..).zip(depth_order(&population.flies)) {
-        ranks[index_of(key) as usize] = rank;
-    }
-    ranks
+/// Binds what the shaders read.
+pub(super) fn bind(
+    pipeline: &GraphicsPipeline,
+    tiles: &Arc<Buffer>,
+    instances: &Arc<Buffer>,
+    masks: &Arc<Image>,
+) -> Result<Arc<BindingGroup>> {
+    let bindings = [Binding::Buffer(tiles), Binding::Buffer(instances), Binding::SampledImage(masks)];
+    BindingGroup::create("mosaic", pipeline.layout(), &bindings)
 }
 
-fn create_pipeline(device: &Arc<Device>, grout: Option<Grout>) -> Result<Arc<GraphicsPipeline>> {
+/// Compiles the shaders for colours, and flies if that is attached, too.
+pub(super) fn create_pipeline(
+    device: &Arc<Device>,
+    grout: Option<Grout>,
+    colors: &[ImageFormat],
+) -> Result<Arc<GraphicsPipeline>> {
     GraphicsPipeline::create(
         device,
         &GraphicsShaders {
@@ -219,7 +247,7 @@ fn create_pipeline(device: &Arc<Device>, grout: Option<Grout>) -> Result<Arc<Gra
             specialization: &[(0, u32::from(grout.is_some()))],
             bindings: &[BindingKind::StorageBuffer, BindingKind::StorageBuffer, BindingKind::SampledImage],
             push_constant_bytes: size_of::<MosaicPush>() as u32,
-            colors: &[ImageFormat::Rgba8Unorm, ImageFormat::R32Uint],
+            colors,
             depth: DepthTest::Less,
         },
     )
