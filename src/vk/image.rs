@@ -16,7 +16,7 @@ use crate::error::{Error, Remedy, Result};
 /// What a pixel of an image holds, which also decides what the image is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageFormat {
-    /// Four channels of 8 bits, 0 to 1: a colour attachment.
+    /// Four channels of 8 bits, 0 to 1: a colour attachment, which can be written and shown, too.
     Rgba8Unorm,
     /// One unsigned 32-bit number: a colour attachment.
     R32Uint,
@@ -47,9 +47,14 @@ impl ImageFormat {
 
     fn usage(self) -> vk::ImageUsageFlags {
         match self {
-            Self::Rgba8Unorm | Self::R32Uint => {
-                vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC
+            // Every device can use this format in all of these ways.
+            Self::Rgba8Unorm => {
+                vk::ImageUsageFlags::COLOR_ATTACHMENT
+                    | vk::ImageUsageFlags::SAMPLED
+                    | vk::ImageUsageFlags::TRANSFER_SRC
+                    | vk::ImageUsageFlags::TRANSFER_DST
             }
+            Self::R32Uint => vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC,
             Self::D32Float => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
             Self::Rg8Uint => vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
         }
@@ -154,6 +159,11 @@ impl Image {
 
     pub(super) fn view(&self) -> vk::ImageView {
         self.view.get()
+    }
+
+    /// The description of a copy between the upper left corner and tightly packed bytes at `buffer_offset`.
+    pub(super) fn corner_copy(&self, [width, height]: [u32; 2], buffer_offset: u64) -> vk::BufferImageCopy {
+        self.layer_copy(0, buffer_offset).image_extent(vk::Extent3D { width, height, depth: 1 })
     }
 
     /// The description of a copy between one layer and tightly packed bytes at `buffer_offset`.

@@ -126,6 +126,32 @@ impl Recorder {
         Ok(())
     }
 
+    /// Writes `width_px` * `height_px` pixels, rows packed tightly, to the upper left corner of an image of format
+    /// [`ImageFormat::Rgba8Unorm`], before the first pass of this submission. Write an image once in a submission.
+    ///
+    /// # Errors
+    /// [`Error::Vulkan`] if the image has another format or is smaller, or `bytes` has not that size.
+    pub fn write_image_corner(
+        &mut self,
+        image: &Arc<Image>,
+        [width_px, height_px]: [u32; 2],
+        bytes: &[u8],
+    ) -> Result<()> {
+        self.begin()?;
+        let shape = image.shape();
+        let has_area = width_px > 0 && height_px > 0;
+        let fits = has_area && width_px <= shape.width_px && height_px <= shape.height_px;
+        let size = u64::from(width_px) * u64::from(height_px) * image.format().pixel_bytes();
+        if image.format() != ImageFormat::Rgba8Unorm || !fits || bytes.len() as u64 != size {
+            return Err(refused(
+                format!("write to image {}", image.name()),
+                format!("{} bytes for {width_px}x{height_px} px of {shape:?} {:?}", bytes.len(), image.format()),
+            ));
+        }
+        self.uploads.add_image_corner(image, [width_px, height_px], bytes);
+        Ok(())
+    }
+
     /// Asks for `size_bytes` bytes at `offset` of the buffer, as they are after the last pass of this submission.
     ///
     /// # Errors

@@ -129,6 +129,14 @@ impl Uploads {
         self.images.push((Arc::clone(image), copy));
     }
 
+    /// Adds a write of the upper left corner of an image.
+    pub(super) fn add_image_corner(&mut self, image: &Arc<Image>, size_px: [u32; 2], bytes: &[u8]) {
+        self.bytes.resize(self.bytes.len().next_multiple_of(IMAGE_ALIGNMENT), 0);
+        let copy = image.corner_copy(size_px, self.bytes.len() as u64);
+        self.bytes.extend_from_slice(bytes);
+        self.images.push((Arc::clone(image), copy));
+    }
+
     fn target_of(&mut self, buffer: &Arc<Buffer>) -> usize {
         // From the end, since consecutive writes often go to the same buffer.
         if let Some(target) = self.targets.iter().rposition(|target| Arc::ptr_eq(target, buffer)) {

@@ -36,6 +36,7 @@ mod labels;
 mod lanes_vulkan;
 mod layering;
 mod layout;
+mod live;
 mod looks;
 mod machines;
 #[cfg(unix)]
