@@ -88,23 +88,29 @@ pub(super) struct QueueFamily {
 
 /// The queue family to work with; `None` if no family of the device computes.
 pub(super) fn queue_family(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Option<QueueFamily> {
-    // SAFETY: V1.
-    let families = unsafe { instance.get_physical_device_queue_family_properties(handle) };
-    best_family(&families)
+    best_family(&computing_families(instance, handle))
 }
 
-/// The first family for graphics and compute, or else the first for compute. Either copies, too, even if it does not
-/// say so.
-fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<QueueFamily> {
-    let first = |wanted: vk::QueueFlags| {
-        let (index, family) = (0..).zip(families).find(|(_, family)| family.queue_flags.contains(wanted))?;
-        Some(QueueFamily {
+/// All families of the device that compute, in its order. They copy, too, even if they do not say so.
+pub(super) fn computing_families(instance: &ash::Instance, handle: vk::PhysicalDevice) -> Vec<QueueFamily> {
+    // SAFETY: V1.
+    computing(&unsafe { instance.get_physical_device_queue_family_properties(handle) })
+}
+
+fn computing(families: &[vk::QueueFamilyProperties]) -> Vec<QueueFamily> {
+    let computing = (0..).zip(families).filter(|(_, family)| family.queue_flags.contains(vk::QueueFlags::COMPUTE));
+    computing
+        .map(|(index, family)| QueueFamily {
             index,
             timestamp_bits: family.timestamp_valid_bits,
             has_graphics: family.queue_flags.contains(vk::QueueFlags::GRAPHICS),
         })
-    };
-    first(vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE).or_else(|| first(vk::QueueFlags::COMPUTE))
+        .collect()
+}
+
+/// The first family that draws, too, or else the first.
+fn best_family(families: &[QueueFamily]) -> Option<QueueFamily> {
+    families.iter().find(|family| family.has_graphics).or(families.first()).copied()
 }
 
 #[cfg(test)]
@@ -126,7 +132,7 @@ mod tests {
     fn a_family_for_graphics_and_compute_is_taken_before_one_for_compute_alone() {
         let (graphics, compute) = (vk::QueueFlags::GRAPHICS, vk::QueueFlags::COMPUTE);
         let transfer = vk::QueueFlags::TRANSFER;
-        let of = |flags: &[vk::QueueFlags]| best_family(&families(flags));
+        let of = |flags: &[vk::QueueFlags]| best_family(&computing(&families(flags)));
         let both = QueueFamily { index: 2, timestamp_bits: 38, has_graphics: true };
         assert_eq!(of(&[transfer, compute | transfer, graphics | compute, graphics | compute]), Some(both));
         let compute_alone = QueueFamily { index: 1, timestamp_bits: 37, has_graphics: false };

@@ -148,7 +148,7 @@ fn choose_among(request: &DeviceRequest, devices: &[DeviceInfo], fits: impl Fn(&
 }
 
 /// The order of preference; the best device has the lowest rank.
-fn rank(device: &DeviceInfo) -> (u8, Reverse<u64>, usize) {
+pub(super) fn rank(device: &DeviceInfo) -> (u8, Reverse<u64>, usize) {
     let kind = match device.kind {
         DeviceKind::Discrete => 0,
         DeviceKind::Integrated => 1,

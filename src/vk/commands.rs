@@ -82,26 +82,32 @@ pub(super) fn run_and_wait(
     fence: vk::Fence,
     last_pass: &str,
 ) -> Result<()> {
+    let infos: Vec<_> =
+        commands.iter().map(|&commands| vk::CommandBufferSubmitInfo::default().command_buffer(commands)).collect();
+    submit(device, vk::SubmitInfo2::default().command_buffer_infos(&infos), fence, last_pass)?;
+    wait_for(device, fence, last_pass)
+}
+
+/// Hands work to the queue, which signals the fence when it is over. It has to be waited for by [`wait_for`].
+pub(super) fn submit(device: &Arc<Device>, work: vk::SubmitInfo2<'_>, fence: vk::Fence, last_pass: &str) -> Result<()> {
     let failed = |call: &str, result| submission_failed(call, result, last_pass);
     if device.is_given_up() {
         return Err(failed("vkQueueSubmit2", vk::Result::ERROR_DEVICE_LOST));
     }
-    let infos: Vec<_> =
-        commands.iter().map(|&commands| vk::CommandBufferSubmitInfo::default().command_buffer(commands)).collect();
-    let submits = [vk::SubmitInfo2::default().command_buffer_infos(&infos)];
-    let fences = [fence];
-    {
-        let queue = device.queue();
-        // SAFETY: V1, V2, V3: the fence is not in use, since every submission is waited for.
-        unsafe {
-            device.raw().reset_fences(&fences).map_err(|result| failed("vkResetFences", result))?;
-            device.raw().queue_submit2(*queue, &submits, fence).map_err(|result| failed("vkQueueSubmit2", result))?;
-        }
+    let queue = device.queue();
+    // SAFETY: V1, V2, V3: the fence is not in use, since every submission is waited for.
+    unsafe {
+        device.raw().reset_fences(&[fence]).map_err(|result| failed("vkResetFences", result))?;
+        device.raw().queue_submit2(*queue, &[work], fence).map_err(|result| failed("vkQueueSubmit2", result))
     }
+}
+
+/// Waits until the work with this fence is over, as [`run_and_wait`] does.
+pub(super) fn wait_for(device: &Arc<Device>, fence: vk::Fence, last_pass: &str) -> Result<()> {
     let patience = device.patience();
     let most_ns = patience.map_or(u64::MAX, |patience| u64::try_from(patience.as_nanos()).unwrap_or(u64::MAX));
     // SAFETY: V1.
-    match unsafe { device.raw().wait_for_fences(&fences, true, most_ns) } {
+    match unsafe { device.raw().wait_for_fences(&[fence], true, most_ns) } {
         Ok(()) => Ok(()),
         Err(vk::Result::TIMEOUT) => {
             // V2: what the commands use must not be destroyed any more, and nothing can be waited for.
@@ -111,7 +117,7 @@ pub(super) fn run_and_wait(
         Err(result) => {
             // V2: the objects that the commands use are dropped next.
             device.wait_idle();
-            Err(failed("vkWaitForFences", result))
+            Err(submission_failed("vkWaitForFences", result, last_pass))
         }
     }
 }

@@ -11,7 +11,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
-use super::abilities;
+use super::abilities::{self, QueueFamily};
 use super::observe::{Calibrated, clock_extension};
 use super::physical::{self, DeviceInfo, DeviceKind};
 use super::{Instance, SubmissionObserver, call_failed, lock, refused};
@@ -89,11 +89,36 @@ impl Device {
     /// refuses.
     pub fn create(instance: &Arc<Instance>, info: &DeviceInfo, options: &DeviceOptions) -> Result<Arc<Self>> {
         let physical = find_physical(instance, info)?;
-        let queue_family = abilities::queue_family(instance.raw(), physical)
-            .ok_or_else(|| lacks(info, vec![abilities::COMPUTE_QUEUE.to_owned()]))?
-            .index;
+        let family = abilities::queue_family(instance.raw(), physical)
+            .ok_or_else(|| lacks(info, vec![abilities::COMPUTE_QUEUE.to_owned()]))?;
+        Self::open(instance, info, (physical, family), &[], options)
+    }
+
+    /// As [`Self::create`], with one more extension and a queue of a family that the device can present from.
+    #[cfg(feature = "view")]
+    pub(super) fn create_to_present(
+        instance: &Arc<Instance>,
+        info: &DeviceInfo,
+        family: QueueFamily,
+        extension: &CStr,
+    ) -> Result<Arc<Self>> {
+        let physical = find_physical(instance, info)?;
+        let mut info = info.clone();
+        info.limits.timestamp_bits = family.timestamp_bits;
+        Self::open(instance, &info, (physical, family), &[extension], &DeviceOptions::default())
+    }
+
+    fn open(
+        instance: &Arc<Instance>,
+        info: &DeviceInfo,
+        (physical, family): (vk::PhysicalDevice, QueueFamily),
+        extensions: &[&CStr],
+        options: &DeviceOptions,
+    ) -> Result<Arc<Self>> {
+        let queue_family = family.index;
         let clock = clock_extension(instance, physical)?;
-        let functions = create_raw(instance, physical, info, queue_family, clock)?;
+        let extensions: Vec<&CStr> = extensions.iter().copied().chain(clock).collect();
+        let functions = create_raw(instance, physical, info, queue_family, &extensions)?;
         let debug_utils = instance.has_debug_utils().then(|| debug_utils::Device::new(instance.raw(), &functions));
         let calibrated = clock.map(|name| Calibrated::new(instance.raw(), &functions, name));
         let raw = RawDevice { functions, debug_utils, calibrated, physical, instance: Arc::clone(instance) };
@@ -276,11 +301,11 @@ fn create_raw(
     physical: vk::PhysicalDevice,
     info: &DeviceInfo,
     queue_family: u32,
-    clock: Option<&CStr>,
+    extensions: &[&CStr],
 ) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&priorities)];
-    let mut extensions: Vec<_> = clock.into_iter().map(CStr::as_ptr).collect();
+    let mut extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
     // An implementation that is only partial requires this extension to be enabled.
     if physical::has_extension(instance.raw(), physical, PORTABILITY_SUBSET)? {
         extensions.push(PORTABILITY_SUBSET.as_ptr());

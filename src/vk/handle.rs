@@ -36,6 +36,8 @@ destroy_with! {
     vk::Pipeline => destroy_pipeline,
     vk::PipelineLayout => destroy_pipeline_layout,
     vk::QueryPool => destroy_query_pool,
+    vk::Sampler => destroy_sampler,
+    vk::Semaphore => destroy_semaphore,
     vk::ShaderModule => destroy_shader_module,
 }
 

@@ -47,13 +47,18 @@ impl Instance {
     /// [`Error::NoSuitableDevice`] with what to install if the loader, a driver or the validation layer is missing;
     /// [`Error::Vulkan`] for anything else.
     pub fn create(options: InstanceOptions) -> Result<Arc<Self>> {
+        Self::create_for_surface(options, &[])
+    }
+
+    /// As [`Self::create`], with the extensions that a surface needs.
+    pub(super) fn create_for_surface(options: InstanceOptions, surface: &[&'static CStr]) -> Result<Arc<Self>> {
         let entry = loader::open().map_err(|error| no_loader(&error))?;
         require_vulkan_1_3(&entry)?;
-        let extensions = Extensions::available(&entry, options.validation)?;
+        let extensions = Extensions::available(&entry, options.validation, surface)?;
         let log = Arc::new(ValidationLog::default());
-        let raw = create_raw(&entry, options.validation, extensions, &log)?;
-        let mut instance =
-            Self { messenger: None, log, raw, has_debug_utils: extensions.debug_utils, entry: entry.clone() };
+        let has_debug_utils = extensions.debug_utils;
+        let raw = create_raw(&entry, options.validation, &extensions, &log)?;
+        let mut instance = Self { messenger: None, log, raw, has_debug_utils, entry: entry.clone() };
         if options.validation == Validation::On {
             instance.messenger = Some(Messenger::create(&entry, &instance.raw, &instance.log)?);
         }
@@ -113,9 +118,10 @@ impl Drop for Instance {
     }
 }
 
-/// Which optional instance extensions are available.
-#[derive(Clone, Copy)]
-struct Extensions {
+/// The instance extensions to enable.
+struct Extensions<'a> {
+    /// What a surface needs; all of it is available.
+    surface: &'a [&'static CStr],
     /// Object names, labels and the messenger.
     debug_utils: bool,
     /// Settings of the validation layer; offered by the layer itself.
@@ -124,30 +130,35 @@ struct Extensions {
     portability: bool,
 }
 
-impl Extensions {
-    fn available(entry: &ash::Entry, validation: Validation) -> Result<Self> {
+impl<'a> Extensions<'a> {
+    fn available(entry: &ash::Entry, validation: Validation, surface: &'a [&'static CStr]) -> Result<Self> {
         let mut offered = list_extensions(entry, None)?;
         if validation == Validation::On {
             offered.extend(list_extensions(entry, Some(VALIDATION_LAYER))?);
         }
         let has =
             |name: &CStr| offered.iter().any(|extension| extension.extension_name_as_c_str().is_ok_and(|n| n == name));
+        if let Some(absent) = surface.iter().find(|name| !has(name)) {
+            let absent = absent.to_string_lossy();
+            return Err(no_device(NoDevice::Other(format!("Vulkan shows no window here: no driver offers {absent}"))));
+        }
         Ok(Self {
+            surface,
             debug_utils: has(ash::ext::debug_utils::NAME),
             validation_features: has(VALIDATION_FEATURES),
             portability: has(ash::khr::portability_enumeration::NAME),
         })
     }
 
-    fn names(self) -> Vec<*const std::ffi::c_char> {
-        [
+    fn names(&self) -> Vec<*const std::ffi::c_char> {
+        let optional = [
             (self.debug_utils, ash::ext::debug_utils::NAME),
             (self.validation_features, VALIDATION_FEATURES),
             (self.portability, ash::khr::portability_enumeration::NAME),
         ]
         .into_iter()
-        .filter_map(|(available, name)| available.then_some(name.as_ptr()))
-        .collect()
+        .filter_map(|(available, name)| available.then_some(name.as_ptr()));
+        optional.chain(self.surface.iter().map(|name| name.as_ptr())).collect()
     }
 }
 
@@ -170,7 +181,7 @@ fn require_vulkan_1_3(entry: &ash::Entry) -> Result<()> {
 fn create_raw(
     entry: &ash::Entry,
     validation: Validation,
-    extensions: Extensions,
+    extensions: &Extensions<'_>,
     log: &Arc<ValidationLog>,
 ) -> Result<ash::Instance> {
     let application = vk::ApplicationInfo::default().application_name(c"smalti").api_version(vk::API_VERSION_1_3);

@@ -54,6 +54,8 @@ mod replay;
 mod scenarios;
 mod schemes;
 mod score;
+#[cfg(all(unix, feature = "view"))]
+mod screen;
 #[path = "../../tools/shader_manifest.rs"]
 mod shader_manifest;
 mod shaders_fresh;
