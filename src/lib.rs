@@ -37,7 +37,8 @@
 //! better). The marginal fitness of a fly is the SAE without it minus the SAE with it: positive means that the fly
 //! helps.
 //!
-//! **Features.** `cli`, on by default, adds the command line; `default-features = false` embeds the engine alone.
+//! **Features.** `cli` adds the command line and `view` the window, both on by default; `default-features = false`
+//! embeds the engine alone.
 //!
 //! **Stability.** What this page lists is the interface. All other modules are public for the tests and benches of the
 //! project, hidden from these pages, and change without notice.
@@ -81,6 +82,8 @@ pub mod studio;
 pub mod threads;
 #[doc(hidden)]
 pub mod vector;
+#[cfg(feature = "view")]
+mod view;
 #[doc(hidden)]
 pub mod vk;
 

@@ -22,6 +22,8 @@ use crate::cli::commands::score::ScoreArgs;
 use crate::cli::commands::show::ShowArgs;
 use crate::cli::commands::timelapse::TimelapseArgs;
 use crate::cli::commands::video::VideoArgs;
+#[cfg(feature = "view")]
+use crate::cli::commands::view::ViewArgs;
 use crate::cli::list::{self, BatchArgs};
 use crate::cli::terminal::{self, advice, interrupt};
 use crate::cli::{commands, config, help, hints};
@@ -35,8 +37,8 @@ smalti evolve -h shows the most used flags of a command, and smalti evolve --hel
 const AFTER_LONG_HELP: &str = "\
 Begin with: smalti evolve photo.jpg -o mosaic.png --style mosaic
 
-Exit codes: 0 done; 1 failed; 2 wrong usage or unreadable input; 3 some items failed; 4 no suitable device; 75 interrupted, or the \
-device was lost (run the same command again); 130 second Ctrl-C.";
+Exit codes: 0 done; 1 failed; 2 wrong usage or unreadable input; 3 some items failed; 4 no suitable device or display; 75 interrupted, or \
+the device was lost (run the same command again); 130 second Ctrl-C.";
 
 /// Evolves pictures into mosaics of thousands of tiles.
 #[derive(Debug, Parser)]
@@ -129,6 +131,8 @@ pub fn run(cli: &Cli) -> ExitCode {
     }
     match &cli.command {
         Command::Evolve(args) => commands::evolve::evolve(args),
+        #[cfg(feature = "view")]
+        Command::View(args) => commands::view::view(args, commands::render::redraw),
         Command::Batch(args) => commands::batch::make(args, &cli.typed),
         Command::Render(args) => commands::render::render(args),
         Command::Timelapse(args) => commands::timelapse::make(args),
@@ -161,6 +165,11 @@ enum Command {
     /// Thousands of coloured tiles change step by step, until together they look like the picture. The same picture,
     /// options and seed give the same bytes on every device.
     Evolve(Box<EvolveArgs>),
+    /// Open the window: watch a picture turn to tiles, and steer it
+    ///
+    /// Everything that smalti evolve can be asked for is a control there, and takes effect while one looks.
+    #[cfg(feature = "view")]
+    View(ViewArgs),
     /// Evolve many pictures
     ///
     /// If it is interrupted, the same command goes on from there. A bad picture does not stop the others: its line in

@@ -8,8 +8,8 @@ use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use self::Right::{Flag, Words};
-use crate::cli::values::quoted;
 use crate::evolve::style::Style;
+use crate::studio::quoted;
 
 /// Endings of pictures, in lower case.
 const PICTURES: [&str; 11] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "gif", "heic", "avif", "jxl"];

@@ -71,15 +71,6 @@ fn decimal(text: &str, zeros: u32) -> Option<u64> {
     whole(&digits)?.checked_mul(10_u64.pow(zeros - after.len() as u32))
 }
 
-/// A word, quoted for a shell.
-pub(crate) fn quoted(text: &str) -> String {
-    let is_plain = |char: char| char.is_ascii_alphanumeric() || "-_./=:,+@%".contains(char);
-    if !text.is_empty() && text.chars().all(is_plain) {
-        return text.to_owned();
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
-}
-
 /// A text as a cell of a CSV table. Spreadsheets take a cell for a formula that begins like one, and run it; with an
 /// apostrophe in front it is text. Numbers stay numbers.
 pub(crate) fn table_cell(text: &str) -> Cow<'_, str> {
@@ -233,15 +224,6 @@ mod tests {
             "9999999999999999999h",
         ] {
             assert!(duration(text).is_err(), "{text:?}");
-        }
-    }
-
-    #[test]
-    fn a_word_is_quoted_for_a_shell_where_it_must_be() {
-        assert_eq!(quoted("--style=mosaic"), "--style=mosaic");
-        assert_eq!(quoted("/a/b_c-1.png"), "/a/b_c-1.png");
-        for (text, expected) in [("", "''"), ("a b", "'a b'"), ("$x", "'$x'"), ("it's", r"'it'\''s'"), ("*", "'*'")] {
-            assert_eq!(quoted(text), expected);
         }
     }
 

@@ -122,6 +122,14 @@ pub enum Error {
         /// What the system said.
         reason: String,
     },
+    /// The window ended by a failure, and what it showed was saved.
+    #[error("{error}; the tiles were saved as {}", path.display())]
+    Rescued {
+        /// Why it ended.
+        error: Box<Self>,
+        /// The population that was saved.
+        path: PathBuf,
+    },
     /// Somebody asked for the end before the work was done.
     #[error("interrupted")]
     Interrupted,
@@ -189,6 +197,12 @@ pub enum NoDevice {
     Gone {
         /// Name of the device.
         device: String,
+    },
+    /// A window cannot be shown.
+    #[error("there is no display for a window ({reason}); run it on a desktop, or use smalti evolve")]
+    NoDisplay {
+        /// What the system said.
+        reason: String,
     },
     /// Every hardware GPU was asked for, and there is none.
     #[error("there is no hardware GPU")]

@@ -65,6 +65,8 @@ pub use self::written::{CarriedMask, MaskKind, WrittenBounds, WrittenClass, Writ
 pub(crate) use self::asked::look_asked;
 pub(crate) use self::cells::CellsSettings;
 pub(crate) use self::choices::Colors;
+#[cfg(feature = "view")]
+pub(crate) use self::device::check_messages;
 pub(crate) use self::device::{OpenedSearch, Opening, PipelineKeeper, select, select_all};
 pub(crate) use self::drawing::{Content, Drawn, Pieces, SUPERSAMPLING_MAX, View, difference, usual_supersampling};
 pub(crate) use self::hashes::population_sha256;
@@ -79,4 +81,4 @@ pub(crate) use self::provenance::{KEYWORD, Provenance, Provenances, SOFTWARE, To
 pub(crate) use self::script::Outlook;
 pub(crate) use self::settings::{LONG_SIDE_PX, SchemeSettings, Settings};
 pub(crate) use self::text_file::{SETTINGS_BYTES_MAX, read_text, text_of, toml_mistake};
-pub(crate) use self::words::{backdrop, color, color_count, grout_color};
+pub(crate) use self::words::{backdrop, color, color_count, grout_color, quoted};

@@ -39,6 +39,15 @@ pub(crate) fn grout_color(text: &str) -> Result<GroutColor, String> {
     }
 }
 
+/// A word, quoted for a shell.
+pub(crate) fn quoted(text: &str) -> String {
+    let is_plain = |char: char| char.is_ascii_alphanumeric() || "-_./=:,+@%".contains(char);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text.to_owned();
+    }
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,6 +66,15 @@ mod tests {
         assert_eq!(color_count("60"), Ok(Colors::Few(60)));
         for text in ["", "0", "257", "-1", "+1", "all", "18446744073709551616"] {
             assert!(color_count(text).is_err(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn a_word_is_quoted_for_a_shell_where_it_must_be() {
+        assert_eq!(quoted("style=mosaic"), "style=mosaic");
+        assert_eq!(quoted("/a/b_c-1.png"), "/a/b_c-1.png");
+        for (text, expected) in [("", "''"), ("a b", "'a b'"), ("$x", "'$x'"), ("it's", r"'it'\''s'"), ("*", "'*'")] {
+            assert_eq!(quoted(text), expected);
         }
     }
 }

@@ -19,6 +19,8 @@ mod cli_refusals;
 mod cli_scheme;
 mod compute_only;
 mod determinism;
+#[cfg(all(unix, feature = "view"))]
+mod display;
 mod exactness;
 mod files;
 mod front_door;
@@ -74,5 +76,7 @@ mod transparency;
 mod video;
 mod vulkan;
 mod vulkan_failures;
+#[cfg(all(unix, feature = "view"))]
+mod window;
 mod within_a_round;
 mod workshop;

@@ -1,7 +1,7 @@
 //! The screen of a window, in a real one: an X server without a display, under the validation layer.
 
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::path::Path;
+use std::process::Command;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -14,49 +14,22 @@ use winit::event_loop::{ActiveEventLoop, EventLoop};
 use winit::platform::x11::EventLoopBuilderExtX11;
 use winit::window::{Window, WindowId};
 
+use crate::display::{Display, photograph};
 use crate::workshop::Workshop;
 
 /// A dark colour, where a display is at its most inexact.
 const SHOWN: [u8; 3] = [10, 3, 77];
 const BEHIND: [u8; 3] = [200, 100, 50];
 
-/// An X server that ends with the test.
-struct Server {
-    process: Child,
-    display: String,
-}
-
-impl Server {
-    fn start() -> Self {
-        let mut process = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap_or_else(|error| panic!("tests of the window need Xvfb; apt-get install xvfb: {error}"));
-        let mut number = String::new();
-        BufReader::new(process.stdout.take().unwrap()).read_line(&mut number).expect("Xvfb tells its display");
-        assert!(!number.trim().is_empty(), "Xvfb does not start");
-        Self { process, display: format!(":{}", number.trim()) }
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
 #[test]
 fn a_window_shows_the_interface_and_an_image_at_every_size_and_validation_is_silent() {
-    let server = Server::start();
+    let display = Display::start(1_024, 768);
     let workshop = Workshop::new();
     let picture = workshop.path("screen.png");
     // A process has one event loop for all its life, so that the window gets a process of its own.
     let output = Command::new(std::env::current_exe().expect("the test binary has a path"))
         .args(["--exact", "screen::child_that_opens_a_window", "--ignored", "--nocapture"])
-        .env("DISPLAY", &server.display)
+        .env("DISPLAY", display.name())
         .env_remove("WAYLAND_DISPLAY")
         .env("SMALTI_TEST_PICTURE", &picture)
         .output()
@@ -124,7 +97,9 @@ fn show(window: &Arc<Window>) -> Vec<String> {
     let _ = window.request_inner_size(PhysicalSize::new(700, 500));
     std::thread::sleep(Duration::from_millis(50));
     assert_eq!(stage.paint(&mut screen, [700, 500]), Painted::Shown);
-    photograph();
+    std::thread::sleep(Duration::from_millis(100));
+    let picture = std::env::var_os("SMALTI_TEST_PICTURE").expect("the parent says where to");
+    photograph(&std::env::var("DISPLAY").expect("the parent tells its display"), Path::new(&picture));
 
     screen.remove_image(stage.id);
     let gone = stage.try_paint(&mut screen, [700, 500]).expect_err("the interface names an image that is gone");
@@ -187,14 +162,4 @@ impl Stage {
         textures.clear();
         painted
     }
-}
-
-/// Writes what the whole display shows.
-fn photograph() {
-    std::thread::sleep(Duration::from_millis(100));
-    let picture = std::env::var_os("SMALTI_TEST_PICTURE").expect("the parent says where to");
-    let status = Command::new("import").args(["-window", "root"]).arg(picture).status();
-    let status =
-        status.unwrap_or_else(|error| panic!("tests of the window need import; apt-get install imagemagick: {error}"));
-    assert!(status.success());
 }

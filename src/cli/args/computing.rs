@@ -131,6 +131,18 @@ impl ComputingArgs {
 }
 
 impl Computing {
+    /// What is asked for where there are no flags.
+    #[cfg(feature = "view")]
+    pub(crate) fn usual() -> Self {
+        Self {
+            request: DeviceRequest::Auto,
+            validation: Validation::Off,
+            on_device_lost: OnDeviceLost::Stop,
+            device_timeout: None,
+            threads: None,
+        }
+    }
+
     /// Starts the threads of the CPU: as many as were asked for, or as many as there are processors.
     pub(crate) fn start_threads(&self) -> Result<()> {
         threads::start(self.threads).map_err(|error| match (self.threads, error) {

@@ -15,3 +15,5 @@ pub(crate) mod score;
 pub(crate) mod show;
 pub(crate) mod timelapse;
 pub(crate) mod video;
+#[cfg(feature = "view")]
+pub(crate) mod view;

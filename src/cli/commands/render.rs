@@ -1,6 +1,6 @@
 //! `smalti render`: draws a population from a file again, or writes it in another format.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -181,22 +181,29 @@ struct RenderRow {
     error: Option<String>,
 }
 
+impl RenderRow {
+    /// Of a file of which nothing is known yet.
+    fn new(input: &Path) -> Self {
+        Self {
+            id: input.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            status: Status::Failed,
+            output: Vec::new(),
+            key: None,
+            tiles: None,
+            load_ms: 0.0,
+            draw_ms: 0.0,
+            save_ms: 0.0,
+            device: None,
+            host: terminal::host_name(),
+            version: env!("CARGO_PKG_VERSION"),
+            error: None,
+        }
+    }
+}
+
 /// Draws one population and reports on it; returns the exit code of the process.
 pub(crate) fn render(args: &RenderArgs) -> ExitCode {
-    let mut row = RenderRow {
-        id: args.input.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        status: Status::Failed,
-        output: Vec::new(),
-        key: None,
-        tiles: None,
-        load_ms: 0.0,
-        draw_ms: 0.0,
-        save_ms: 0.0,
-        device: None,
-        host: terminal::host_name(),
-        version: env!("CARGO_PKG_VERSION"),
-        error: None,
-    };
+    let mut row = RenderRow::new(&args.input);
     let done = RenderOptions::new(args).and_then(|options| render_population(&options, &mut row));
     if let Err(error) = &done {
         row.error = Some(advice::sentence(error));
@@ -207,6 +214,27 @@ pub(crate) fn render(args: &RenderArgs) -> ExitCode {
         terminal::error(&advice::sentence(error));
     }
     done.and(printed).map_or_else(|error| ExitCode::from(advice::exit_code(&error)), |()| ExitCode::SUCCESS)
+}
+
+/// Draws the tiles of a file into another, with a longer side in px or as they evolved, as `smalti render` does without
+/// further flags. What is there is replaced.
+///
+/// # Errors
+/// If the file holds no tiles, the other one cannot be written, or the format cannot hold them.
+#[cfg(feature = "view")]
+pub(crate) fn redraw(input: &Path, output: &Path, long_side_px: Option<u32>) -> Result<()> {
+    let options = RenderOptions {
+        input: input.to_owned(),
+        outputs: vec![Destination::for_result(output)?],
+        overwrite: Overwrite::Force,
+        output_long_side_px: long_side_px,
+        background: None,
+        look: None,
+        supersampling: None,
+        computing: Computing::usual(),
+        verbosity: Verbosity::Quiet,
+    };
+    render_population(&options, &mut RenderRow::new(input))
 }
 
 /// The work, in order: check, read, draw, encode and write.

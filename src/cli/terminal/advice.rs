@@ -53,6 +53,7 @@ pub(crate) fn exit_code(error: &Error) -> u8 {
         | Error::Encoding { .. }
         | Error::TooLarge { .. } => 2,
         Error::NoSuitableDevice { .. } => 4,
+        Error::Rescued { error, .. } => exit_code(error),
         Error::DeviceLost { .. } | Error::Interrupted => 75,
         Error::Output { .. }
         | Error::OutOfDeviceMemory { .. }
@@ -85,7 +86,7 @@ fn no_device(why: &NoDevice) -> String {
             format!("--validate needs a Vulkan device, and {reason}; name one, such as --device vulkan")
         }
         NoDevice::Gone { .. } => format!("{why}; run again"),
-        NoDevice::Lacks { request: None, .. } | NoDevice::Other(_) => why.to_string(),
+        NoDevice::Lacks { request: None, .. } | NoDevice::NoDisplay { .. } | NoDevice::Other(_) => why.to_string(),
     }
 }
 

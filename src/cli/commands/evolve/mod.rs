@@ -23,12 +23,11 @@ use crate::cli::jobs::watch::Watchers;
 use crate::cli::terminal::interrupt::Interrupt;
 use crate::cli::terminal::{self, Verbosity, advice, aside};
 use crate::cli::trace::{self, Capture, CaptureRange, TraceArgs};
-use crate::cli::values::quoted;
 use crate::error::{Error, Result};
 use crate::evolve::Ending;
 use crate::model::Rgb;
 use crate::photo::{self, Photo};
-use crate::studio::{Device, Job, LONG_SIDE_PX, Provenance, picture_metadata, without_header};
+use crate::studio::{Device, Job, LONG_SIDE_PX, Provenance, picture_metadata, quoted, without_header};
 
 /// Evolves one picture and reports on it; returns the exit code of the process.
 pub(crate) fn evolve(args: &EvolveArgs) -> ExitCode {

@@ -20,8 +20,9 @@ use crate::cli::list::shard::{self, SHARD_COUNT_MAX};
 use crate::cli::list::{self, BatchArgs, Item, ManifestRow};
 use crate::cli::terminal::{self, Verbosity, words};
 use crate::cli::trace::Tracer;
-use crate::cli::values::{self, in_range, quoted};
+use crate::cli::values::{self, in_range};
 use crate::error::{Error, Result, in_words};
+use crate::studio::quoted;
 
 /// A shard with less work than this, in seconds, costs a cluster too much compared with its work.
 const SHARD_MIN_S: f64 = 60.0;

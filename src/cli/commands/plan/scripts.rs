@@ -6,7 +6,7 @@
 use std::fmt::Write;
 
 use crate::cli::terminal::words;
-use crate::cli::values::quoted;
+use crate::studio::quoted;
 
 /// Least digits of the numbers in the names of shards.
 const DIGITS_MIN: usize = 4;

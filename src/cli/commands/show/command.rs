@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use crate::cli::values::quoted;
+use crate::studio::quoted;
 
 /// The flags that people look for first, in this order; all others follow in that of the alphabet.
 const FIRST: [&str; 6] = ["scheme", "style", "preset", "tiles", "size", "output-size"];

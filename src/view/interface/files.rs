@@ -1,0 +1,104 @@
+//! Fields for paths: typed, or chosen by a dialog of the desktop where there is one.
+
+use std::path::{Path, PathBuf};
+
+use egui::{Key, TextEdit, Ui};
+
+use super::Interface;
+
+/// A path that is typed, and taken with Enter or its button.
+#[derive(Default)]
+pub(super) struct PathField {
+    text: String,
+    is_open: bool,
+}
+
+/// All fields for paths.
+#[derive(Default)]
+pub(super) struct Fields {
+    pub palette: PathField,
+    pub mask: PathField,
+    pub load_map: PathField,
+    pub save_map: PathField,
+}
+
+impl PathField {
+    /// A button that opens the field, and the field; the path, once it is taken.
+    pub(super) fn show(&mut self, ui: &mut Ui, name: &str, hint: &str) -> Option<PathBuf> {
+        if !self.is_open {
+            if ui.button(format!("{}…", super::controls::title(name))).on_hover_text(hint).clicked() {
+                self.is_open = true;
+            }
+            return None;
+        }
+        let mut taken = None;
+        ui.horizontal(|ui| {
+            let edit =
+                TextEdit::singleline(&mut self.text).hint_text("path").desired_width(ui.available_width() - 70.0);
+            let response = ui.add(edit).on_hover_text(hint);
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::TextEdit, true, name));
+            let is_entered = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+            if (ui.button("OK").clicked() || is_entered) && !self.text.trim().is_empty() {
+                taken = Some(typed(&self.text));
+            }
+            if ui.small_button("×").on_hover_text("Close").clicked() {
+                self.is_open = false;
+            }
+        });
+        if taken.is_some() {
+            self.is_open = false;
+        }
+        taken
+    }
+}
+
+/// A path as people type or paste it: with quotation marks, as an address of a file, or with a tilde.
+pub(super) fn typed(text: &str) -> PathBuf {
+    let text = text.trim().trim_matches(['"', '\'']);
+    let text = text.strip_prefix("file://").unwrap_or(text);
+    match (text.strip_prefix("~/"), std::env::home_dir()) {
+        (Some(rest), Some(home)) => home.join(rest),
+        _ => Path::new(text).to_owned(),
+    }
+}
+
+impl Interface {
+    /// The field for what is to be opened.
+    pub(super) fn show_open_field(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            let edit = TextEdit::singleline(&mut self.open_path).hint_text("path of a picture, a .npz or a folder");
+            let response = ui.add(edit.desired_width(280.0));
+            response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::TextEdit, true, "path to open"));
+            let is_entered = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+            if (ui.button("Open").clicked() || is_entered) && !self.open_path.trim().is_empty() {
+                let path = typed(&self.open_path);
+                self.open(path);
+                self.wants_open_field = false;
+            }
+        });
+    }
+
+    /// The same as a small window, where a picture is open already and the desktop has no dialog.
+    pub(super) fn show_open_window(&mut self, ui: &mut Ui) {
+        if !self.wants_open_field || self.news.picture.is_none() {
+            return;
+        }
+        let mut is_open = true;
+        egui::Window::new("Open").open(&mut is_open).collapsible(false).resizable(false).show(ui.ctx(), |ui| {
+            self.show_open_field(ui);
+        });
+        self.wants_open_field &= is_open;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_taken_as_people_paste_them() {
+        for text in ["a b.png", " a b.png\n", "'a b.png'", "\"a b.png\"", "file://a b.png"] {
+            assert_eq!(typed(text), Path::new("a b.png"), "{text:?}");
+        }
+    }
+}

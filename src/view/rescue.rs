@@ -1,0 +1,29 @@
+//! What is saved when the device or the display is gone: the last tiles that were shown.
+
+use std::path::{Path, PathBuf};
+
+use super::news::News;
+use super::remembered;
+use crate::archive;
+use crate::error::Result;
+use crate::output;
+
+/// Writes the last tiles beside the picture, or where that cannot be, into the folder of the user's configuration; the
+/// file, if there were tiles.
+pub(super) fn rescue(news: &News) -> Result<Option<PathBuf>> {
+    let Some(tiles) = &news.tiles else { return Ok(None) };
+    let bytes = archive::encode_snapshot(tiles, &serde_json::Map::new())?;
+    let picture = news.picture.as_ref().and_then(|picture| picture.path.as_deref());
+    let stem = picture.and_then(Path::file_stem).map_or_else(|| "mosaic".into(), |stem| stem.to_string_lossy());
+    let name = format!("{stem}-rescued.npz");
+    let beside = picture.and_then(Path::parent).unwrap_or(Path::new(""));
+    let folders = std::iter::once(beside.to_owned()).chain(remembered::folder());
+    let mut outcome = Ok(None);
+    for path in folders.map(|folder| folder.join(&name)) {
+        outcome = output::write_atomically(&path, &bytes).map(|()| Some(path));
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    outcome
+}

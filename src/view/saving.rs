@@ -1,0 +1,87 @@
+//! Writing what the window shows: the same bytes as the command that it shows beside.
+
+use std::path::{Path, PathBuf};
+
+use super::news::SaveOrder;
+use crate::error::{Error, Result};
+use crate::output;
+use crate::studio::{Device, Mosaic, Script, Session, quoted};
+
+/// Draws the tiles of the first file into the second, with a longer side in px or as they evolved.
+pub(crate) type Redraw = fn(&Path, &Path, Option<u32>) -> Result<()>;
+
+/// Writes a file; a sentence about it.
+///
+/// # Errors
+/// If the device fails, the format cannot hold the mosaic, or the file cannot be written.
+pub(super) fn save(
+    session: &mut Session<'_>,
+    script: &Script,
+    input: Option<&Path>,
+    device: &Device,
+    save: &SaveOrder,
+) -> Result<String> {
+    output::check_writable(&save.path)?;
+    let is_at_end = session.stop_reason().is_some();
+    let mut mosaic = session.mosaic()?;
+    if let Some(px) = save.long_side_px {
+        mosaic = mosaic.resized(px, device)?;
+    }
+    let bytes = encoded(&mosaic, &save.path)?;
+    let mut wrote = save.path.display().to_string();
+    if !can_be_asked_for(script, is_at_end) {
+        let steps = steps_beside(&save.path);
+        let script = Script { until: session.until(), ..script.clone() };
+        output::write_atomically(&steps, &script.write()?)?;
+        wrote += &format!(" and {}", super::name_of(&steps));
+    }
+    output::write_atomically(&save.path, &bytes)?;
+    Ok(format!("Wrote {wrote}. It is made again by: {}", command(script, is_at_end, input, Some(save))))
+}
+
+/// The bytes of a mosaic in the format that the ending of a path names.
+fn encoded(mosaic: &Mosaic, path: &Path) -> Result<Vec<u8>> {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    match ending.as_str() {
+        "png" => mosaic.png(),
+        "jpg" | "jpeg" => mosaic.jpeg(),
+        "webp" => mosaic.webp(),
+        "svg" => mosaic.svg(),
+        "ora" => mosaic.ora(),
+        "npz" => mosaic.npz(),
+        "csv" => mosaic.csv(),
+        "json" => mosaic.json(),
+        _ => Err(Error::Output {
+            path: path.to_owned(),
+            reason: "has no ending that is known; end it with .png, .jpg, .webp, .svg, .ora, .npz, .csv or .json"
+                .to_owned(),
+        }),
+    }
+}
+
+/// Whether flags alone ask for the same mosaic: it was not steered, nor ended by hand.
+fn can_be_asked_for(script: &Script, is_at_end: bool) -> bool {
+    is_at_end && script.steps.len() == 1 && script.steps[0].recipe.flags().is_some()
+}
+
+/// The script of steps beside an output.
+fn steps_beside(path: &Path) -> PathBuf {
+    path.with_extension("steps.json")
+}
+
+/// The command that makes the mosaic again. A search that is still running is told as if it went on to its end.
+pub(super) fn command(script: &Script, is_at_end: bool, input: Option<&Path>, save: Option<&SaveOrder>) -> String {
+    let word = |path: &Path| quoted(&path.display().to_string());
+    let input = input.map_or_else(|| "PICTURE".to_owned(), word);
+    let output = save.map_or_else(|| Path::new("mosaic.png"), |save| &save.path);
+    let size = save.and_then(|save| save.long_side_px).map_or_else(String::new, |px| format!(" --output-size {px}"));
+    let flags = match script.steps.as_slice() {
+        [step] if is_at_end || save.is_none() => step.recipe.flags(),
+        _ => None,
+    };
+    let rest = match flags {
+        Some(flags) => flags.iter().map(|flag| format!(" {}", quoted(flag))).collect(),
+        None => format!(" --replay {}", word(&steps_beside(output))),
+    };
+    format!("smalti evolve {input} -o {}{rest}{size}", word(output))
+}

@@ -1,0 +1,396 @@
+//! The thread of the search. It owns the session, does what it is ordered to between two rounds, and tells the news.
+//! It never waits for the window.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::time::{Duration, Instant};
+
+use super::course::Course;
+use super::news::{Desk, Doing, Moment, Note, Order, PictureNews, SaveOrder, Standing};
+use super::opening::{self, Found, Snapshots};
+use super::saving::{self, Redraw};
+use super::wishes::Wishes;
+use crate::cpu::CpuPainter;
+use crate::error::{Error, Result};
+use crate::model::{Canvas, Painter, Population, Rgb};
+use crate::studio::{Device, Picture, Script, Session, Step, WrittenRecipe};
+
+/// Time between two pieces of news about the tiles: a smooth display, of which a search on the same processors hardly
+/// takes notice (`tools/measure-window`).
+const BETWEEN_NEWS: Duration = Duration::from_millis(90);
+/// How often a search that rests looks whether the window wants to know more.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(80);
+
+/// What the worker is given for what only the command line can do.
+pub(super) struct Tools {
+    pub snapshots: Snapshots,
+    pub redraw: Redraw,
+}
+
+/// Does what it is ordered to until the window is gone.
+pub(super) fn work(device: &Device, tools: &Tools, orders: &Receiver<Order>, desk: &Arc<Desk>) {
+    let mut worker = Worker::new(device, tools, desk);
+    desk.tell(|news| news.device = device.label().to_owned());
+    loop {
+        let order = if worker.is_running {
+            match orders.try_recv() {
+                Ok(order) => Some(order),
+                Err(TryRecvError::Empty) => None,
+                Err(TryRecvError::Disconnected) => return,
+            }
+        } else {
+            match orders.recv_timeout(BETWEEN_LOOKS) {
+                Ok(order) => Some(order),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        };
+        let done = match order {
+            Some(Order::Quit) => return,
+            Some(order) => worker.follow(latest(order, orders)),
+            None => worker.go_on(),
+        };
+        if let Err(error) = done {
+            worker.fail(&error);
+        }
+    }
+}
+
+/// The order, or where it is a wish that newer wishes follow, the newest of them.
+fn latest(mut order: Order, orders: &Receiver<Order>) -> Vec<Order> {
+    let mut all = Vec::new();
+    while matches!(order, Order::Ask(_)) {
+        let Ok(next) = orders.try_recv() else { break };
+        if !matches!(next, Order::Ask(_)) {
+            all.push(order);
+        }
+        order = next;
+    }
+    all.push(order);
+    all
+}
+
+/// What is open.
+struct Open {
+    picture: Picture,
+    news: Arc<PictureNews>,
+}
+
+struct Worker<'d> {
+    device: &'d Device,
+    tools: &'d Tools,
+    desk: &'d Arc<Desk>,
+    open: Option<Open>,
+    wishes: Wishes,
+    session: Option<Session<'d>>,
+    script: Script,
+    /// The file of the tiles that are shown without a search.
+    shown: Option<PathBuf>,
+    course: Course,
+    is_running: bool,
+    told: Instant,
+    /// What was told last of: evals, whether marginal fitness and errors of pixels were there, and what was going on.
+    told_of: Option<(u64, bool, bool, Doing)>,
+    clock: (Instant, u64),
+}
+
+impl<'d> Worker<'d> {
+    fn new(device: &'d Device, tools: &'d Tools, desk: &'d Arc<Desk>) -> Self {
+        Self {
+            device,
+            tools,
+            desk,
+            open: None,
+            wishes: Wishes::default(),
+            session: None,
+            script: Script::default(),
+            shown: None,
+            course: Course::default(),
+            is_running: false,
+            told: Instant::now(),
+            told_of: None,
+            clock: (Instant::now(), 0),
+        }
+    }
+
+    fn follow(&mut self, orders: Vec<Order>) -> Result<()> {
+        orders.into_iter().try_for_each(|order| self.follow_one(order))
+    }
+
+    fn follow_one(&mut self, order: Order) -> Result<()> {
+        match order {
+            Order::Open(path) => {
+                self.say_opening();
+                match opening::find(&path, self.tools.snapshots)? {
+                    Found::Picture(picture) => {
+                        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+                        self.take(picture, name.unwrap_or_default(), Some(path))
+                    }
+                    Found::Tiles { moments, file } => {
+                        self.show(&path, moments, file);
+                        Ok(())
+                    }
+                }
+            }
+            Order::Take { size: [width_px, height_px], rgba } => {
+                self.say_opening();
+                self.take(Picture::from_rgba8(width_px, height_px, &rgba)?, "pasted picture".to_owned(), None)
+            }
+            Order::Ask(wishes) => self.ask(*wishes),
+            Order::Go => self.run(true),
+            Order::Pause => self.run(false),
+            Order::Step => {
+                self.is_running = false;
+                self.advance()?;
+                self.tell(Instant::now())
+            }
+            Order::Restart => {
+                if self.open.is_some() {
+                    self.begin()?;
+                }
+                Ok(())
+            }
+            Order::Save(save) => {
+                self.desk.tell(|news| news.is_saving = true);
+                let saved = self.save(&save);
+                self.desk.tell(|news| news.is_saving = false);
+                let text = saved?;
+                self.desk.tell(|news| news.notes.push(Note::done(text)));
+                Ok(())
+            }
+            Order::Quit => Ok(()),
+        }
+    }
+
+    fn say_opening(&self) {
+        self.desk.tell(|news| news.doing = Doing::Opening);
+    }
+
+    /// Takes a picture and begins to evolve it. What was open stays if that fails.
+    fn take(&mut self, picture: Picture, name: String, path: Option<PathBuf>) -> Result<()> {
+        let wishes = Wishes { weight: None, ..self.wishes.clone() };
+        let session = self.session_of(&wishes, &picture)?;
+        let warnings: Vec<Note> = picture.warnings().iter().map(Note::hint).collect();
+        let target = session.0.target();
+        let original = picture.size_px();
+        let news = Arc::new(PictureNews {
+            name,
+            path,
+            original: [original.0, original.1],
+            size: [target.width_px, target.height_px],
+            rgba: target.rgba8(),
+        });
+        self.open = Some(Open { picture, news: Arc::clone(&news) });
+        self.wishes = wishes;
+        self.desk.tell(|told| {
+            told.picture = Some(news);
+            told.tiles = None;
+            told.notes.extend(warnings);
+        });
+        self.put_on(session);
+        self.run(true)
+    }
+
+    /// Shows saved tiles, which no search works on.
+    fn show(&mut self, path: &Path, moments: Vec<Moment>, file: PathBuf) {
+        (self.open, self.session, self.shown, self.is_running) = (None, None, Some(file), false);
+        self.course = Course::of(moments);
+        let Some(last) = self.course.moments().last().cloned() else { return };
+        let size = [last.tiles.width_px, last.tiles.height_px];
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let picture = PictureNews { name, path: Some(path.to_owned()), original: size, size, rgba: Vec::new() };
+        let moments = Arc::clone(self.course.moments());
+        self.desk.tell(|news| {
+            news.standing.evals = last.evals;
+            news.standing.tile_count = last.tiles.flies.iter().filter(|fly| fly.alive).count();
+            news.standing.error = last.error;
+            news.picture = Some(Arc::new(picture));
+            news.tiles = Some(last.tiles);
+            (news.marginal, news.error_map) = (None, None);
+            news.course = moments;
+            news.doing = Doing::Showing;
+            news.command = String::new();
+        });
+    }
+
+    /// A session by these wishes, and what was written of them.
+    fn session_of(&self, wishes: &Wishes, picture: &Picture) -> Result<(Session<'d>, WrittenRecipe)> {
+        let written = wishes.written(picture.size_px())?;
+        Ok((Session::begin(&written.recipe()?, picture, self.device)?, written))
+    }
+
+    /// Begins anew with the present wishes.
+    fn begin(&mut self) -> Result<()> {
+        let Some(open) = &self.open else { return Ok(()) };
+        let session = self.session_of(&self.wishes, &open.picture)?;
+        let size = [session.0.target().width_px, session.0.target().height_px];
+        if open.news.size != size {
+            let target = session.0.target();
+            let old = &open.news;
+            let (name, path, original) = (old.name.clone(), old.path.clone(), old.original);
+            let news = Arc::new(PictureNews { name, path, original, size, rgba: target.rgba8() });
+            self.open = Some(Open { picture: open.picture.clone(), news: Arc::clone(&news) });
+            self.desk.tell(|told| told.picture = Some(news));
+        }
+        self.put_on(session);
+        self.run(true)
+    }
+
+    fn put_on(&mut self, (session, written): (Session<'d>, WrittenRecipe)) {
+        let input_sha256 = self.open.as_ref().map(|open| open.picture.sha256().to_owned()).unwrap_or_default();
+        self.script = Script { input_sha256, steps: vec![Step { evals: 0, recipe: written }], until: None };
+        self.session = Some(session);
+        self.course = Course::default();
+        self.clock = (Instant::now(), 0);
+        self.told_of = None;
+    }
+
+    /// Goes on by other wishes, or begins anew where they need that.
+    fn ask(&mut self, wishes: Wishes) -> Result<()> {
+        let Some(open) = &self.open else {
+            self.wishes = wishes;
+            return Ok(());
+        };
+        let Some(session) = &mut self.session else {
+            self.wishes = wishes;
+            return self.begin();
+        };
+        let mut written = wishes.written(open.picture.size_px())?;
+        if session.evals() > 0 {
+            if session.stop_reason().is_some() {
+                // What is changed at the end needs some time to show.
+                let spent = session.evals();
+                let planned = session.evals_planned();
+                written.evals = Some(spent + (planned / 4).max(1));
+            }
+            if session.change(&written.recipe()?).is_ok() {
+                self.script.steps.push(Step { evals: session.evals(), recipe: written });
+                self.wishes = wishes;
+                self.told_of = None;
+                return self.run(true);
+            }
+            // Another number of tiles, another size, or tiles that show through: that needs a new beginning.
+            let hint = "That cannot be changed half-way, so the picture began anew";
+            self.desk.tell(|news| news.notes.push(Note::hint(hint)));
+        }
+        let before = std::mem::replace(&mut self.wishes, wishes);
+        let begun = self.begin();
+        if begun.is_err() {
+            self.wishes = before;
+        }
+        begun
+    }
+
+    fn run(&mut self, is_running: bool) -> Result<()> {
+        self.is_running = is_running && self.session.as_ref().is_some_and(|session| session.stop_reason().is_none());
+        if let Some(session) = &mut self.session {
+            self.clock = (Instant::now(), session.evals());
+        }
+        self.tell(Instant::now())
+    }
+
+    /// What there is to do without an order.
+    fn go_on(&mut self) -> Result<()> {
+        if self.is_running {
+            self.advance()?;
+        }
+        let now = Instant::now();
+        let is_due = now.duration_since(self.told) >= BETWEEN_NEWS;
+        if self.session.is_some() && (is_due || !self.is_running) { self.tell(now) } else { Ok(()) }
+    }
+
+    /// One round.
+    fn advance(&mut self) -> Result<()> {
+        let Some(session) = &mut self.session else { return Ok(()) };
+        if session.step()?.is_some() {
+            self.is_running = false;
+        }
+        Ok(())
+    }
+
+    /// Tells how far the search is, unless that is known.
+    fn tell(&mut self, now: Instant) -> Result<()> {
+        let Some(session) = &mut self.session else { return Ok(()) };
+        let evals = session.evals();
+        let wants_marginal = self.desk.wants_marginal.load(Ordering::Relaxed);
+        let wants_error_map = self.desk.wants_error_map.load(Ordering::Relaxed);
+        let doing = match session.stop_reason() {
+            Some(reason) => Doing::Done(reason),
+            None if self.is_running => Doing::Running,
+            None => Doing::Paused,
+        };
+        self.told = now;
+        let known = Some((evals, wants_marginal, wants_error_map, doing));
+        if self.told_of == known {
+            // A window that nothing happens in is not woken.
+            return Ok(());
+        }
+        let tiles = Arc::new(session.population()?);
+        let pixel_count = u64::from(tiles.width_px) * u64::from(tiles.height_px);
+        let error = session.sae()? as f64 / (pixel_count * 3) as f64;
+        let marginal = if wants_marginal { Some(Arc::new(session.marginal()?)) } else { None };
+        let target = if wants_error_map { Some(session.target()) } else { None };
+        let error_map = target.map(|target| errors(&tiles, &target.pixels)).transpose()?.map(Arc::new);
+        let (since, before) = self.clock;
+        let seconds = now.duration_since(since).as_secs_f64();
+        self.course.add(evals, error, &tiles);
+        let standing = Standing {
+            evals,
+            evals_planned: session.evals_planned(),
+            tile_count: tiles.flies.iter().filter(|fly| fly.alive).count(),
+            error,
+            evals_per_s: if seconds > 0.2 { (evals - before) as f64 / seconds } else { 0.0 },
+        };
+        let is_at_end = session.stop_reason().is_some();
+        let input = self.open.as_ref().and_then(|open| open.news.path.clone());
+        let command = saving::command(&self.script, is_at_end, input.as_deref(), None);
+        let course = Arc::clone(self.course.moments());
+        self.desk.tell(|news| {
+            (news.tiles, news.marginal, news.error_map) = (Some(tiles), marginal, error_map);
+            (news.standing, news.doing, news.course, news.command) = (standing, doing, course, command);
+        });
+        self.told_of = known;
+        Ok(())
+    }
+
+    /// Writes a file; a sentence about it.
+    fn save(&mut self, save: &SaveOrder) -> Result<String> {
+        let Some(session) = &mut self.session else {
+            // Tiles that were opened and not evolved are drawn again, as they lie in their file.
+            let shown = self.shown.as_deref().ok_or_else(|| Error::Internal("there is nothing to save".to_owned()))?;
+            (self.tools.redraw)(shown, &save.path, save.long_side_px)?;
+            return Ok(format!("Wrote {}", save.path.display()));
+        };
+        let input = self.open.as_ref().and_then(|open| open.news.path.clone());
+        saving::save(session, &self.script, input.as_deref(), self.device, save)
+    }
+
+    /// Says what failed. The tiles that there are stay on the screen.
+    fn fail(&mut self, error: &Error) {
+        let is_lost = matches!(error, Error::DeviceLost { .. });
+        let doing = match &mut self.session {
+            None if self.course.moments().is_empty() => Doing::Nothing,
+            None => Doing::Showing,
+            Some(session) => session.stop_reason().map_or(Doing::Paused, Doing::Done),
+        };
+        self.is_running = self.is_running && !is_lost && self.session.is_some();
+        let doing = if self.is_running { Doing::Running } else { doing };
+        let text = error.to_string();
+        self.desk.tell(|news| {
+            news.doing = doing;
+            news.notes.push(Note::failure(text));
+        });
+    }
+}
+
+/// The error of each pixel: the sum over its channels, 0 to 765.
+fn errors(tiles: &Population, target: &[Rgb]) -> Result<Vec<u16>> {
+    let canvas = Canvas::evaluation(tiles.width_px, tiles.height_px);
+    let mosaic = CpuPainter.draw(tiles, &canvas, 1)?;
+    let pixels = mosaic.over_black();
+    let of_pixel =
+        |(one, other): (&Rgb, &Rgb)| one.iter().zip(other).map(|(&one, &other)| u16::from(one.abs_diff(other))).sum();
+    Ok(pixels.iter().zip(target).map(of_pixel).collect())
+}
