@@ -135,6 +135,12 @@ impl<'d> Session<'d> {
         self.stop
     }
 
+    /// The number of flies, absent ones too.
+    #[cfg(feature = "view")]
+    pub(crate) fn fly_count(&self) -> usize {
+        self.job.fly_count
+    }
+
     /// Children that are evaluated from the beginning on if nothing ends the work before; in the paper's scheme each is
     /// a birth. The round that spends them may make some more.
     #[must_use]

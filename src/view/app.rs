@@ -108,6 +108,8 @@ struct Shown {
     retired: Vec<egui::TextureId>,
     /// What the image shows.
     drawn: Option<(Arc<Population>, LiveView)>,
+    /// Whether Ctrl is held, or Command.
+    is_command: bool,
     /// Frames in which the mosaic was drawn.
     drawn_frames: u64,
     /// When the next frame is due without any event.
@@ -130,7 +132,7 @@ impl App {
 
     /// Opens the window.
     fn show(&mut self, events: &ActiveEventLoop) -> Result<Shown> {
-        let [width, height] = self.remembered.size.unwrap_or(FIRST_SIZE);
+        let [width, height] = on_monitor(events, self.remembered.size.unwrap_or(FIRST_SIZE));
         // AccessKit wants the window invisible until its adapter is there.
         let attributes = Window::default_attributes()
             .with_title("smalti")
@@ -159,6 +161,7 @@ impl App {
             image: None,
             retired: Vec::new(),
             drawn: None,
+            is_command: false,
             drawn_frames: 0,
             next: None,
         })
@@ -258,6 +261,9 @@ impl App {
         if let Ok(image) = pasted {
             let size = [image.width, image.height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
             self.interface.take(size, image.bytes.into_owned());
+        } else {
+            let now = self.ctx.input(|input| input.time);
+            self.interface.say(Note::hint("There is no picture in the clipboard"), now);
         }
     }
 
@@ -284,8 +290,10 @@ impl App {
         drop(shown);
         // If it is gone already, it needs no order.
         let _ = orders.send(Order::Quit);
+        drop(orders);
         let searched = worker.join().unwrap_or_else(|_| Err(Error::Internal("the search ended too early".to_owned())));
-        let ended = failure.map_or(ended, Err).and(searched);
+        // What the search could not do is the reason where both failed.
+        let ended = searched.and(failure.map_or(ended, Err));
         let news: News = desk.fetch();
         let Err(error) = ended else {
             log.as_deref().map_or(Ok(()), check_messages)?;
@@ -297,6 +305,16 @@ impl App {
             Ok(None) | Err(_) => error,
         })
     }
+}
+
+/// A size in points that fits the monitor.
+fn on_monitor(events: &ActiveEventLoop, size: [f32; 2]) -> [f32; 2] {
+    let monitor = events.primary_monitor().or_else(|| events.available_monitors().next());
+    let Some(monitor) = monitor else { return size };
+    let room = monitor.size().to_logical::<f32>(monitor.scale_factor());
+    // Some of it is taken by bars and by the frame of the window.
+    let fitted = |side: f32, room: f32| if room > 0.0 { side.min(room * 0.95 - 40.0) } else { side };
+    [fitted(size[0], room.width), fitted(size[1], room.height)]
 }
 
 impl Figures {
@@ -376,8 +394,13 @@ impl ApplicationHandler<Wake> for App {
         let response = shown.input.on_window_event(&shown.window, &event);
         match event {
             WindowEvent::CloseRequested => {
-                self.remember();
-                events.exit();
+                let now = self.ctx.input(|input| input.time);
+                if self.interface.may_close(now) {
+                    self.remember();
+                    events.exit();
+                } else {
+                    shown.window.request_redraw();
+                }
             }
             WindowEvent::Resized(size) => {
                 shown.screen.resize([size.width, size.height]);
@@ -389,9 +412,14 @@ impl ApplicationHandler<Wake> for App {
                 }
                 self.follow_requests();
             }
+            WindowEvent::ModifiersChanged(modifiers) => {
+                let keys = modifiers.state();
+                shown.is_command = if cfg!(target_os = "macos") { keys.super_key() } else { keys.control_key() };
+            }
             WindowEvent::KeyboardInput { event, .. } => {
-                let is_paste = event.state.is_pressed() && event.logical_key.to_text() == Some("v");
-                let is_command = self.ctx.input(|input| input.modifiers.command);
+                let is_v = event.logical_key.to_text().is_some_and(|text| text.eq_ignore_ascii_case("v"));
+                let is_paste = event.state.is_pressed() && !event.repeat && is_v;
+                let is_command = shown.is_command;
                 let is_typing = self.ctx.text_edit_focused();
                 if response.repaint {
                     shown.window.request_redraw();

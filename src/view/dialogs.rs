@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::threads;
 
 /// A dialog that ends sooner was never shown: nobody is so fast.
-const NOT_SHOWN: Duration = Duration::from_millis(150);
+const NOT_SHOWN: Duration = Duration::from_millis(1_000);
 
 /// What a dialog is for.
 #[derive(Clone, Debug, PartialEq, Eq)]

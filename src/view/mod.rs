@@ -15,6 +15,7 @@ mod course;
 mod dialogs;
 mod interface;
 mod news;
+mod opened;
 mod opening;
 mod pick;
 mod remembered;

@@ -18,7 +18,7 @@ pub(super) enum Order {
         rgba: Vec<u8>,
     },
     /// Evolve by these wishes: go on from the present tiles if possible, else begin anew.
-    Ask(Box<Wishes>),
+    Ask(Box<Ask>),
     Go,
     Pause,
     /// One round, then rest.
@@ -27,6 +27,13 @@ pub(super) enum Order {
     Restart,
     Save(SaveOrder),
     Quit,
+}
+
+/// Wishes, and the picture that they are for.
+pub(super) struct Ask {
+    pub wishes: Wishes,
+    /// [`PictureNews::serial`]; 0 if there was none.
+    pub serial: u64,
 }
 
 /// A file to be written.
@@ -40,12 +47,12 @@ pub(super) struct SaveOrder {
 
 /// The picture that is open.
 pub(super) struct PictureNews {
+    /// Another number for each picture that is opened.
+    pub serial: u64,
     /// Its name, for people.
     pub name: String,
     /// Its file, if it has one.
     pub path: Option<PathBuf>,
-    /// Width and height in px of the file.
-    pub original: [u32; 2],
     /// Width and height in px at which it evolves.
     pub size: [u32; 2],
     /// Four bytes for each pixel, as it evolves; empty if only tiles are known.
@@ -132,6 +139,8 @@ pub(super) struct News {
     pub command: String,
     /// What computes, for people.
     pub device: String,
+    /// Whether it was steered since it was last saved.
+    pub is_unsaved: bool,
     /// Whether a file is being written.
     pub is_saving: bool,
     /// Messages that were not fetched yet.
@@ -175,6 +184,11 @@ impl Desk {
         let mut news = self.lock();
         let notes = std::mem::take(&mut news.notes);
         News { notes, ..news.clone() }
+    }
+
+    /// The news, whose notes stay to be fetched.
+    pub(super) fn peek(&self) -> News {
+        self.lock().clone()
     }
 
     /// Tells what the window looks at.

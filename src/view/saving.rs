@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::news::SaveOrder;
+use super::opened::Open;
 use crate::error::{Error, Result};
 use crate::output;
 use crate::studio::{Device, Mosaic, Script, Session, quoted};
@@ -10,14 +11,14 @@ use crate::studio::{Device, Mosaic, Script, Session, quoted};
 /// Draws the tiles of the first file into the second, with a longer side in px or as they evolved.
 pub(crate) type Redraw = fn(&Path, &Path, Option<u32>) -> Result<()>;
 
-/// Writes a file; a sentence about it.
+/// Writes a file, and beside it what else the command needs that makes it again; a sentence about them.
 ///
 /// # Errors
 /// If the device fails, the format cannot hold the mosaic, or the file cannot be written.
 pub(super) fn save(
     session: &mut Session<'_>,
     script: &Script,
-    input: Option<&Path>,
+    open: &Open,
     device: &Device,
     save: &SaveOrder,
 ) -> Result<String> {
@@ -27,16 +28,25 @@ pub(super) fn save(
     if let Some(px) = save.long_side_px {
         mosaic = mosaic.resized(px, device)?;
     }
-    let bytes = encoded(&mosaic, &save.path)?;
+    output::write_atomically(&save.path, &encoded(&mosaic, &save.path)?)?;
     let mut wrote = save.path.display().to_string();
-    if !can_be_asked_for(script, is_at_end) {
-        let steps = steps_beside(&save.path);
-        let script = Script { until: session.until(), ..script.clone() };
-        output::write_atomically(&steps, &script.write()?)?;
-        wrote += &format!(" and {}", super::name_of(&steps));
+    let mut input = open.path().map(Path::to_owned);
+    if let Some(bytes) = &open.pasted {
+        let source = beside(&save.path, "source.png");
+        output::write_atomically(&source, bytes)?;
+        wrote += &format!(", {}", super::name_of(&source));
+        input = Some(source);
     }
-    output::write_atomically(&save.path, &bytes)?;
-    Ok(format!("Wrote {wrote}. It is made again by: {}", command(script, is_at_end, input, Some(save))))
+    if !can_be_asked_for(script, is_at_end) {
+        let steps = beside(&save.path, "steps.json");
+        let script = Script { until: session.until(), ..script.clone() };
+        // The mosaic is there, whatever becomes of its steps.
+        if let Err(error) = script.write().and_then(|bytes| output::write_atomically(&steps, &bytes)) {
+            return Ok(format!("Wrote {wrote}, but not its steps, so that no command makes it again: {error}"));
+        }
+        wrote += &format!(", {}", super::name_of(&steps));
+    }
+    Ok(format!("Wrote {wrote}. It is made again by: {}", command(script, is_at_end, input.as_deref(), Some(save))))
 }
 
 /// The bytes of a mosaic in the format that the ending of a path names.
@@ -64,9 +74,9 @@ fn can_be_asked_for(script: &Script, is_at_end: bool) -> bool {
     is_at_end && script.steps.len() == 1 && script.steps[0].recipe.flags().is_some()
 }
 
-/// The script of steps beside an output.
-fn steps_beside(path: &Path) -> PathBuf {
-    path.with_extension("steps.json")
+/// A file beside an output, whose whole name it has, since another format has other steps.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    path.with_file_name(format!("{}.{ending}", super::name_of(path)))
 }
 
 /// The command that makes the mosaic again. A search that is still running is told as if it went on to its end.
@@ -81,7 +91,7 @@ pub(super) fn command(script: &Script, is_at_end: bool, input: Option<&Path>, sa
     };
     let rest = match flags {
         Some(flags) => flags.iter().map(|flag| format!(" {}", quoted(flag))).collect(),
-        None => format!(" --replay {}", word(&steps_beside(output))),
+        None => format!(" --replay {}", word(&beside(output, "steps.json"))),
     };
     format!("smalti evolve {input} -o {}{rest}{size}", word(output))
 }

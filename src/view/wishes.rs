@@ -114,6 +114,19 @@ pub(super) struct WeightMap {
     pub luma: Vec<u8>,
 }
 
+impl WeightMap {
+    /// The same map for a picture of another size: each pixel as the nearest one was.
+    pub(super) fn resized(&self, size: [u32; 2]) -> Self {
+        let [old_width, old_height] = self.size.map(u64::from);
+        let [width, height] = size.map(u64::from);
+        let pixel = |place: u64| {
+            let (x, y) = (place % width * old_width / width, place / width * old_height / height);
+            self.luma[(y * old_width + x) as usize]
+        };
+        Self { size, luma: (0..width * height).map(pixel).collect() }
+    }
+}
+
 impl std::fmt::Debug for WeightMap {
     fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         out.debug_struct("WeightMap").field("size", &self.size).finish_non_exhaustive()
@@ -190,6 +203,11 @@ impl History {
         !self.future.is_empty()
     }
 
+    /// Forgets the maps of weights, where another picture is opened.
+    pub(super) fn drop_weights(&mut self) {
+        self.past.iter_mut().chain(&mut self.future).for_each(|wishes| wishes.weight = None);
+    }
+
     /// Takes the last change back.
     pub(super) fn undo(&mut self, wishes: &mut Wishes) {
         if let Some(before) = self.past.pop() {
@@ -208,6 +226,14 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_map_of_another_size_tells_the_same_places() {
+        let map = WeightMap { size: [4, 2], luma: vec![0, 0, 9, 9, 5, 5, 7, 7] };
+        assert_eq!(map.resized([2, 1]).luma, [0, 9]);
+        assert_eq!(map.resized([2, 2]).luma, [0, 9, 5, 7]);
+        assert_eq!(map.resized([2, 2]).resized([4, 2]), map);
+    }
 
     #[test]
     fn changes_are_taken_back_and_made_again_in_order() {

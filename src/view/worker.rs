@@ -8,10 +8,12 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::{Duration, Instant};
 
 use super::course::Course;
-use super::news::{Desk, Doing, Moment, Note, Order, PictureNews, SaveOrder, Standing};
+use super::news::{Ask, Desk, Doing, Moment, Note, Order, PictureNews, SaveOrder, Standing};
+use super::opened::{Open, Origin, pasted};
 use super::opening::{self, Found, Snapshots};
+use super::rescue;
 use super::saving::{self, Redraw};
-use super::wishes::Wishes;
+use super::wishes::{EVALS_PER_TILE, Wishes};
 use crate::cpu::CpuPainter;
 use crate::error::{Error, Result};
 use crate::model::{Canvas, Painter, Population, Rgb};
@@ -48,8 +50,15 @@ pub(super) fn work(device: &Device, tools: &Tools, orders: &Receiver<Order>, des
             }
         };
         let done = match order {
-            Some(Order::Quit) => return,
-            Some(order) => worker.follow(latest(order, orders)),
+            Some(order) => {
+                let batch = latest(order, orders);
+                let quits = batch.iter().any(|order| matches!(order, Order::Quit));
+                worker.follow(batch);
+                if quits {
+                    return;
+                }
+                Ok(())
+            }
             None => worker.go_on(),
         };
         if let Err(error) = done {
@@ -72,12 +81,6 @@ fn latest(mut order: Order, orders: &Receiver<Order>) -> Vec<Order> {
     all
 }
 
-/// What is open.
-struct Open {
-    picture: Picture,
-    news: Arc<PictureNews>,
-}
-
 struct Worker<'d> {
     device: &'d Device,
     tools: &'d Tools,
@@ -88,12 +91,18 @@ struct Worker<'d> {
     script: Script,
     /// The file of the tiles that are shown without a search.
     shown: Option<PathBuf>,
+    /// Evals of this many tiles, unless another number is asked for.
+    usual_evals: u64,
     course: Course,
     is_running: bool,
     told: Instant,
     /// What was told last of: evals, whether marginal fitness and errors of pixels were there, and what was going on.
     told_of: Option<(u64, bool, bool, Doing)>,
     clock: (Instant, u64),
+    /// How many pictures were opened.
+    serial: u64,
+    /// Whether the tiles were saved since the device was lost.
+    is_rescued: bool,
 }
 
 impl<'d> Worker<'d> {
@@ -107,16 +116,24 @@ impl<'d> Worker<'d> {
             session: None,
             script: Script::default(),
             shown: None,
+            usual_evals: 0,
             course: Course::default(),
             is_running: false,
             told: Instant::now(),
             told_of: None,
             clock: (Instant::now(), 0),
+            serial: 0,
+            is_rescued: false,
         }
     }
 
-    fn follow(&mut self, orders: Vec<Order>) -> Result<()> {
-        orders.into_iter().try_for_each(|order| self.follow_one(order))
+    /// Follows orders; where one fails, that is told, and the next one is followed all the same.
+    fn follow(&mut self, orders: Vec<Order>) {
+        for order in orders {
+            if let Err(error) = self.follow_one(order) {
+                self.fail(&error);
+            }
+        }
     }
 
     fn follow_one(&mut self, order: Order) -> Result<()> {
@@ -124,21 +141,26 @@ impl<'d> Worker<'d> {
             Order::Open(path) => {
                 self.say_opening();
                 match opening::find(&path, self.tools.snapshots)? {
-                    Found::Picture(picture) => {
-                        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-                        self.take(picture, name.unwrap_or_default(), Some(path))
-                    }
+                    Found::Picture(picture) => self.take(picture, Origin::file(path)),
                     Found::Tiles { moments, file } => {
                         self.show(&path, moments, file);
                         Ok(())
                     }
                 }
             }
-            Order::Take { size: [width_px, height_px], rgba } => {
+            Order::Take { size, rgba } => {
                 self.say_opening();
-                self.take(Picture::from_rgba8(width_px, height_px, &rgba)?, "pasted picture".to_owned(), None)
+                let (picture, origin) = pasted(size, &rgba)?;
+                self.take(picture, origin)
             }
-            Order::Ask(wishes) => self.ask(*wishes),
+            Order::Ask(ask) => {
+                let Ask { mut wishes, serial } = *ask;
+                if self.serial != serial {
+                    // It was painted on another picture.
+                    wishes.weight = None;
+                }
+                self.ask(wishes)
+            }
             Order::Go => self.run(true),
             Order::Pause => self.run(false),
             Order::Step => {
@@ -169,21 +191,14 @@ impl<'d> Worker<'d> {
     }
 
     /// Takes a picture and begins to evolve it. What was open stays if that fails.
-    fn take(&mut self, picture: Picture, name: String, path: Option<PathBuf>) -> Result<()> {
+    fn take(&mut self, picture: Picture, origin: Origin) -> Result<()> {
         let wishes = Wishes { weight: None, ..self.wishes.clone() };
         let session = self.session_of(&wishes, &picture)?;
         let warnings: Vec<Note> = picture.warnings().iter().map(Note::hint).collect();
-        let target = session.0.target();
-        let original = picture.size_px();
-        let news = Arc::new(PictureNews {
-            name,
-            path,
-            original: [original.0, original.1],
-            size: [target.width_px, target.height_px],
-            rgba: target.rgba8(),
-        });
-        self.open = Some(Open { picture, news: Arc::clone(&news) });
-        self.wishes = wishes;
+        self.serial += 1;
+        let open = Open::new(picture, origin, self.serial, &session.0);
+        let news = Arc::clone(&open.news);
+        (self.open, self.shown, self.wishes) = (Some(open), None, wishes);
         self.desk.tell(|told| {
             told.picture = Some(news);
             told.tiles = None;
@@ -199,8 +214,9 @@ impl<'d> Worker<'d> {
         self.course = Course::of(moments);
         let Some(last) = self.course.moments().last().cloned() else { return };
         let size = [last.tiles.width_px, last.tiles.height_px];
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        let picture = PictureNews { name, path: Some(path.to_owned()), original: size, size, rgba: Vec::new() };
+        self.serial += 1;
+        let (name, path) = (super::name_of(path), Some(path.to_owned()));
+        let picture = PictureNews { serial: self.serial, name, path, size, rgba: Vec::new() };
         let moments = Arc::clone(self.course.moments());
         self.desk.tell(|news| {
             news.standing.evals = last.evals;
@@ -211,7 +227,7 @@ impl<'d> Worker<'d> {
             (news.marginal, news.error_map) = (None, None);
             news.course = moments;
             news.doing = Doing::Showing;
-            news.command = String::new();
+            (news.command, news.is_unsaved) = (String::new(), false);
         });
     }
 
@@ -225,15 +241,6 @@ impl<'d> Worker<'d> {
     fn begin(&mut self) -> Result<()> {
         let Some(open) = &self.open else { return Ok(()) };
         let session = self.session_of(&self.wishes, &open.picture)?;
-        let size = [session.0.target().width_px, session.0.target().height_px];
-        if open.news.size != size {
-            let target = session.0.target();
-            let old = &open.news;
-            let (name, path, original) = (old.name.clone(), old.path.clone(), old.original);
-            let news = Arc::new(PictureNews { name, path, original, size, rgba: target.rgba8() });
-            self.open = Some(Open { picture: open.picture.clone(), news: Arc::clone(&news) });
-            self.desk.tell(|told| told.picture = Some(news));
-        }
         self.put_on(session);
         self.run(true)
     }
@@ -241,16 +248,32 @@ impl<'d> Worker<'d> {
     fn put_on(&mut self, (session, written): (Session<'d>, WrittenRecipe)) {
         let input_sha256 = self.open.as_ref().map(|open| open.picture.sha256().to_owned()).unwrap_or_default();
         self.script = Script { input_sha256, steps: vec![Step { evals: 0, recipe: written }], until: None };
+        self.usual_evals = EVALS_PER_TILE * session.fly_count() as u64;
         self.session = Some(session);
         self.course = Course::default();
         self.clock = (Instant::now(), 0);
         self.told_of = None;
+        self.renew_picture();
+        self.desk.tell(|news| news.is_unsaved = false);
+    }
+
+    /// Tells the picture anew where it is evolved at another size or in other colours.
+    fn renew_picture(&mut self) {
+        if let (Some(open), Some(session)) = (&mut self.open, &self.session)
+            && let Some(news) = open.follow(session)
+        {
+            self.desk.tell(|told| told.picture = Some(news));
+        }
     }
 
     /// Goes on by other wishes, or begins anew where they need that.
     fn ask(&mut self, wishes: Wishes) -> Result<()> {
         let Some(open) = &self.open else {
             self.wishes = wishes;
+            if self.shown.is_some() {
+                let hint = "These are saved tiles; open a picture, and it is made by these wishes";
+                self.desk.tell(|news| news.notes.push(Note::hint(hint)));
+            }
             return Ok(());
         };
         let Some(session) = &mut self.session else {
@@ -259,28 +282,29 @@ impl<'d> Worker<'d> {
         };
         let mut written = wishes.written(open.picture.size_px())?;
         if session.evals() > 0 {
-            if session.stop_reason().is_some() {
-                // What is changed at the end needs some time to show.
-                let spent = session.evals();
-                let planned = session.evals_planned();
-                written.evals = Some(spent + (planned / 4).max(1));
-            }
+            let keeps_effort = wishes.evals_per_tile == self.wishes.evals_per_tile;
+            written.evals = budget(session, self.usual_evals, written.evals, keeps_effort);
             if session.change(&written.recipe()?).is_ok() {
                 self.script.steps.push(Step { evals: session.evals(), recipe: written });
                 self.wishes = wishes;
                 self.told_of = None;
+                self.renew_picture();
+                self.desk.tell(|news| news.is_unsaved = true);
                 return self.run(true);
             }
+        }
+        let was_at_work = session.evals() > 0;
+        let before = std::mem::replace(&mut self.wishes, wishes);
+        if let Err(error) = self.begin() {
+            self.wishes = before;
+            return Err(error);
+        }
+        if was_at_work {
             // Another number of tiles, another size, or tiles that show through: that needs a new beginning.
             let hint = "That cannot be changed half-way, so the picture began anew";
             self.desk.tell(|news| news.notes.push(Note::hint(hint)));
         }
-        let before = std::mem::replace(&mut self.wishes, wishes);
-        let begun = self.begin();
-        if begun.is_err() {
-            self.wishes = before;
-        }
-        begun
+        Ok(())
     }
 
     fn run(&mut self, is_running: bool) -> Result<()> {
@@ -327,6 +351,8 @@ impl<'d> Worker<'d> {
             // A window that nothing happens in is not woken.
             return Ok(());
         }
+        // Before anything can fail, so that a failure is told once.
+        self.told_of = known;
         let tiles = Arc::new(session.population()?);
         let pixel_count = u64::from(tiles.width_px) * u64::from(tiles.height_px);
         let error = session.sae()? as f64 / (pixel_count * 3) as f64;
@@ -344,14 +370,13 @@ impl<'d> Worker<'d> {
             evals_per_s: if seconds > 0.2 { (evals - before) as f64 / seconds } else { 0.0 },
         };
         let is_at_end = session.stop_reason().is_some();
-        let input = self.open.as_ref().and_then(|open| open.news.path.clone());
-        let command = saving::command(&self.script, is_at_end, input.as_deref(), None);
+        let input = self.open.as_ref().and_then(Open::path);
+        let command = saving::command(&self.script, is_at_end, input, None);
         let course = Arc::clone(self.course.moments());
         self.desk.tell(|news| {
             (news.tiles, news.marginal, news.error_map) = (Some(tiles), marginal, error_map);
             (news.standing, news.doing, news.course, news.command) = (standing, doing, course, command);
         });
-        self.told_of = known;
         Ok(())
     }
 
@@ -363,8 +388,10 @@ impl<'d> Worker<'d> {
             (self.tools.redraw)(shown, &save.path, save.long_side_px)?;
             return Ok(format!("Wrote {}", save.path.display()));
         };
-        let input = self.open.as_ref().and_then(|open| open.news.path.clone());
-        saving::save(session, &self.script, input.as_deref(), self.device, save)
+        let Some(open) = &self.open else { return Err(Error::Internal("no picture is open".to_owned())) };
+        let said = saving::save(session, &self.script, open, self.device, save)?;
+        self.desk.tell(|news| news.is_unsaved = false);
+        Ok(said)
     }
 
     /// Says what failed. The tiles that there are stay on the screen.
@@ -377,12 +404,32 @@ impl<'d> Worker<'d> {
         };
         self.is_running = self.is_running && !is_lost && self.session.is_some();
         let doing = if self.is_running { Doing::Running } else { doing };
-        let text = error.to_string();
+        let mut text = error.to_string();
+        if is_lost && !std::mem::replace(&mut self.is_rescued, true) {
+            // Nothing more comes from this device, and what was shown last is still here.
+            if let Ok(Some(path)) = rescue::rescue(&self.desk.peek()) {
+                text += &format!("; the tiles were saved as {}", path.display());
+            }
+        }
         self.desk.tell(|news| {
             news.doing = doing;
             news.notes.push(Note::failure(text));
         });
     }
+}
+
+/// The evals to ask for where a session goes on; none is `usual`. What was granted before stays granted unless another
+/// `effort` is asked for, and what is changed at the end gets some time to show.
+fn budget(session: &mut Session<'_>, usual: u64, effort: Option<u64>, keeps_effort: bool) -> Option<u64> {
+    let (spent, planned) = (session.evals(), session.evals_planned());
+    let mut evals = effort.unwrap_or(usual);
+    if keeps_effort {
+        evals = evals.max(planned);
+    }
+    if session.stop_reason().is_some() {
+        evals = evals.max(spent + (usual / 4).max(1));
+    }
+    Some(evals).filter(|&evals| effort.is_some() || evals != usual)
 }
 
 /// The error of each pixel: the sum over its channels, 0 to 765.

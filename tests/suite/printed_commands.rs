@@ -51,6 +51,10 @@ const SMALLER: [(&str, &str); 18] = [
 /// The flags of `SMALTI_CONFIG` while commands run.
 const CONFIGURATION: &str = "[gallery]\nbirths = 1\n[paper]\nbirths = 20\n";
 
+/// What the window would have written beside a mosaic.
+const STEPS: &str = r#"{"smalti": "script", "version": 1, "input-sha256": "", "steps": [
+    {"evals": 0, "recipe": {"style": "mosaic", "tiles": 40, "evals": 4000}}]}"#;
+
 /// Pictures have this size, which makes everything else small, too.
 const SIZE_PX: (u32, u32) = (24, 18);
 
@@ -217,6 +221,7 @@ impl Scratch {
         scratch.workshop.write("work.jsonl", block("docs/batch.md", "json", "\"input\"").as_bytes());
         scratch.workshop.write("tiles.hex", b"102030\nd0c0b0\n806040\n");
         scratch.workshop.write("small.toml", CONFIGURATION.as_bytes());
+        scratch.workshop.write("mosaic.png.steps.json", STEPS.as_bytes());
         std::os::unix::fs::symlink(env!("CARGO_BIN_EXE_smalti"), scratch.programs.path().join("smalti")).unwrap();
         for (program, _, script) in STAND_INS {
             let of_ours = scratch.workshop.path(program);
@@ -343,6 +348,11 @@ fn styles() {
 #[test]
 fn video() {
     follow("docs/video.md");
+}
+
+#[test]
+fn window() {
+    follow("docs/window.md");
 }
 
 #[test]

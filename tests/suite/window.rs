@@ -31,7 +31,7 @@ struct Viewer {
 
 impl Viewer {
     fn open(picture: &str, flags: &str) -> Self {
-        let (workshop, display) = (Workshop::new(), Display::start(1_240, 860).manage());
+        let (workshop, display) = (Workshop::new(), Display::start(1_400, 1_000).manage());
         std::fs::copy(Path::new("tests/photos").join(picture), workshop.path(picture)).expect("the photo is copied");
         let mut process = workshop
             .command(&format!("view {picture} --validate {flags}"))
@@ -180,13 +180,13 @@ fn a_picture_is_opened_steered_looked_at_painted_on_saved_and_made_again() {
     viewer.click(SAVE_PATH);
     viewer.type_text(&saved.display().to_string());
     viewer.click(SAVE_FILE);
-    let steps = viewer.workshop.path("saved.steps.json");
+    let steps = viewer.workshop.path("saved.png.steps.json");
     let began = Instant::now();
     while !(saved.exists() && steps.exists()) {
         assert!(began.elapsed() < Duration::from_secs(120), "nothing was saved");
         std::thread::sleep(Duration::from_millis(100));
     }
-    let again = viewer.workshop.run("evolve woman.jpg --replay saved.steps.json -o again.png");
+    let again = viewer.workshop.run("evolve woman.jpg --replay saved.png.steps.json -o again.png");
     assert_eq!(again.code, Some(0), "{}", again.stderr);
     assert!(viewer.workshop.read("again.png") == viewer.workshop.read("saved.png"), "the command makes the same bytes");
     let script: serde_json::Value = serde_json::from_slice(&std::fs::read(&steps).expect("it is there")).expect("JSON");

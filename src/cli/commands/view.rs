@@ -17,7 +17,7 @@ const AFTER_HELP: &str = "\
 The window shows the mosaic while it evolves, at any scale. On the left is what can be wished for; each change goes on from the \
 present tiles where it can. Below is the course of the error, and a slider back in time.
 
-Keys: Space pause and go on; S one step; R restart; T tiles, D divider, P photo, E error; hold C to see the photo; B brush; \
+Keys: Space pause and go on; S one step; Ctrl+R restart; T tiles, D divider, P photo, E error; hold C to see the photo; B brush; \
 F fit, 1 one to one, + and - zoom, arrows move; Ctrl+O open, Ctrl+S save, Ctrl+Z and Ctrl+Shift+Z undo and redo, Ctrl+V paste a \
 picture.
 

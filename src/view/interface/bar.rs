@@ -9,6 +9,7 @@ use crate::view::news::{Doing, Order};
 
 const OPEN: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::O);
 const SAVE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::S);
+const RESTART: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::R);
 const UNDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Z);
 const REDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
 /// Factor of the scale at a key.
@@ -18,7 +19,12 @@ impl Interface {
     pub(super) fn show_bar(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            if button(ui, true, "Open…", "Open a picture, saved tiles, or a folder of snapshots (Ctrl+O)") {
+            if button(
+                ui,
+                true,
+                "Open…",
+                "Open a picture or saved tiles (Ctrl+O); a folder of snapshots can be dropped on the window",
+            ) {
                 self.begin_open();
             }
             let has_tiles = self.news.tiles.is_some();
@@ -64,7 +70,7 @@ impl Interface {
             self.orders.push(Order::Step);
         }
         let can_restart = matches!(doing, Doing::Running | Doing::Paused | Doing::Done(_));
-        if button(ui, can_restart, "Restart", "Begin anew with these wishes (R)") {
+        if button(ui, can_restart, "Restart", "Begin anew with these wishes (Ctrl+R)") {
             self.restart();
         }
     }
@@ -102,8 +108,7 @@ impl Interface {
     /// The keys, wherever the pointer is. While a text is typed they are letters.
     pub(super) fn keys(&mut self, ui: &Ui) {
         let ctx = ui.ctx();
-        let [open, save, redo, undo] =
-            [OPEN, SAVE, REDO, UNDO].map(|keys| ctx.input_mut(|input| input.consume_shortcut(&keys)));
+        let [open, save] = [OPEN, SAVE].map(|keys| ctx.input_mut(|input| input.consume_shortcut(&keys)));
         if open {
             self.begin_open();
         }
@@ -112,6 +117,12 @@ impl Interface {
         }
         if ctx.text_edit_focused() {
             return;
+        }
+        // The longer one first, which has the shorter one in it.
+        let [restart, redo, undo] =
+            [RESTART, REDO, UNDO].map(|keys| ctx.input_mut(|input| input.consume_shortcut(&keys)));
+        if restart {
+            self.restart();
         }
         if undo && self.history.can_undo() {
             self.undo();
@@ -128,16 +139,15 @@ impl Interface {
         if pressed(Key::S) && matches!(self.news.doing, Doing::Running | Doing::Paused) {
             self.orders.push(Order::Step);
         }
-        if pressed(Key::R) {
-            self.restart();
-        }
         if pressed(Key::F) {
             self.camera = Camera::FITTED;
         }
         if pressed(Key::Num1) {
             self.one_to_one();
         }
-        if pressed(Key::Plus) || pressed(Key::Equals) {
+        // On many keyboards it is typed with Shift.
+        let is_plus = ctx.input(|input| !input.modifiers.command && input.key_pressed(Key::Plus));
+        if is_plus || pressed(Key::Equals) {
             self.zoom(ZOOM_STEP);
         }
         if pressed(Key::Minus) {

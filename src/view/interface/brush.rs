@@ -6,6 +6,7 @@ use egui::{Color32, ColorImage, CursorIcon, Painter, Pos2, Rect, Response, Slide
 use egui::{TextureOptions, Ui, pos2};
 
 use super::Interface;
+use crate::error::Error;
 use crate::photo::{self, Photo};
 use crate::view::camera::Framed;
 use crate::view::news::Note;
@@ -168,6 +169,13 @@ fn read_map(path: &std::path::Path, size: [u32; 2]) -> Result<WeightMap, String>
 }
 
 fn write_map(path: &std::path::Path, map: &WeightMap) -> crate::error::Result<()> {
+    let refuse = |reason: &str| Err(Error::Output { path: path.to_owned(), reason: reason.to_owned() });
+    if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
+        return refuse("is no PNG by its name; end it with .png");
+    }
+    if path.exists() {
+        return refuse("is there already; choose another name");
+    }
     crate::output::write_atomically(path, &encoded(map)?)
 }
 
@@ -203,6 +211,8 @@ mod tests {
         let path = folder.path().join("map.png");
         let map = WeightMap { size: [7, 3], luma: (0..21).map(|place| place * 12).collect() };
         write_map(&path, &map).expect("it is written");
+        assert!(write_map(&path, &map).is_err_and(|error| error.to_string().contains("is there already")));
+        assert!(write_map(&folder.path().join("map.jpg"), &map).is_err(), "it would be a PNG");
         assert_eq!(read_map(&path, [7, 3]), Ok(map));
         assert!(read_map(&path, [3, 7]).is_err_and(|error| error.contains("proportions")));
     }

@@ -11,7 +11,7 @@ use crate::shapes::Shader;
 use crate::view::news::Note;
 use crate::view::wishes::{ColorWish, EVALS_PER_TILE, GroundWish, GroutWish, StyleWish, Wishes};
 
-/// Most px of the longer side that the slider offers; more can be typed.
+/// Most px of the longer side at which a picture evolves here.
 const SIZE_MAX: u64 = 4_096;
 
 impl Interface {

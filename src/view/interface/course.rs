@@ -13,7 +13,10 @@ impl Interface {
             ui.label(self.status());
             if !self.news.command.is_empty() {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    let hint = format!("Copy the command that makes this again:\n{}", self.news.command);
+                    let mut hint = format!("Copy the command that makes this again:\n{}", self.news.command);
+                    if self.news.command.contains(" --replay ") {
+                        hint += "\nIts steps are written beside the mosaic when it is saved.";
+                    }
                     if ui.button("Copy command").on_hover_text(hint).clicked() {
                         ui.ctx().copy_text(self.news.command.clone());
                         let now = ui.input(|input| input.time);

@@ -1,4 +1,4 @@
-//! Fields for paths: typed, or chosen by a dialog of the desktop where there is one.
+//! Fields for paths, which are typed or pasted.
 
 use std::path::{Path, PathBuf};
 

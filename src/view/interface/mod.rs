@@ -25,7 +25,7 @@ use self::messages::Messages;
 use self::saving::SaveForm;
 pub(super) use self::stage::Compare;
 use super::camera::Camera;
-use super::news::{Doing, News, Order};
+use super::news::{Ask, Doing, News, Note, Order, PictureNews};
 use super::wishes::{History, Wishes};
 use crate::gpu::LiveView;
 use crate::model::Population;
@@ -76,8 +76,8 @@ pub(super) struct Interface {
     save: SaveForm,
     messages: Messages,
     thumbnails: Option<Thumbnails>,
-    photo: Option<(usize, TextureHandle)>,
-    error: Option<(usize, TextureHandle)>,
+    photo: Option<(Arc<PictureNews>, TextureHandle)>,
+    error: Option<(Arc<Vec<u16>>, TextureHandle)>,
     /// Whether the desktop has dialogs for files.
     pub has_dialogs: bool,
     orders: Vec<Order>,
@@ -87,6 +87,8 @@ pub(super) struct Interface {
     /// Size of the picture, and the stage in physical pixels.
     on_stage: Option<([u32; 2], Rect)>,
     hovered: Option<usize>,
+    /// Whether the user knows that closing the window loses something.
+    is_warned: bool,
 }
 
 impl Interface {
@@ -116,23 +118,33 @@ impl Interface {
             wanted: None,
             on_stage: None,
             hovered: None,
+            is_warned: false,
         }
     }
 
     /// Takes the newest news; `now` is the time in seconds.
     pub(super) fn hear(&mut self, news: News, now: f64) {
-        let is_other = match (&self.news.picture, &news.picture) {
-            (Some(old), Some(new)) => !Arc::ptr_eq(old, new) && (old.path != new.path || old.name != new.name),
-            (old, new) => old.is_some() != new.is_some(),
-        };
-        if is_other {
+        let serial = |news: &News| news.picture.as_ref().map(|picture| picture.serial);
+        if serial(&self.news) != serial(&news) {
             self.camera = Camera::FITTED;
             self.moment = None;
             self.brush.forget();
-            self.wishes.weight = None;
-            self.asked.weight = None;
+            // What was painted belongs to the picture that it was painted on.
+            self.history.drop_weights();
+            (self.wishes.weight, self.asked.weight) = (None, None);
             let path = news.picture.as_ref().and_then(|picture| picture.path.clone());
             self.save.suggest(path.as_deref());
+        } else if let (Some(picture), Some(map)) = (&news.picture, &self.wishes.weight)
+            && map.size != picture.size
+        {
+            let resized = Some(Arc::new(map.resized(picture.size)));
+            (self.wishes.weight, self.asked.weight) = (resized.clone(), resized);
+            self.brush.forget();
+        }
+        // Moments are thinned out from time to time, so that their places change.
+        let seen = self.moment.and_then(|place| self.news.course.get(place)).map(|moment| moment.evals);
+        if let Some(evals) = seen {
+            self.moment = news.course.iter().position(|moment| moment.evals >= evals);
         }
         if self.moment.is_some_and(|place| place + 1 >= news.course.len()) {
             self.moment = None;
@@ -200,8 +212,19 @@ impl Interface {
         self.save.choose(path);
     }
 
+    /// Whether the window may be closed: at once if nothing would be lost, else when that is asked for again.
+    pub(super) fn may_close(&mut self, now: f64) -> bool {
+        let is_warned = self.is_warned;
+        if self.news.is_unsaved && !is_warned {
+            let text = "This mosaic was steered and is not saved: save it (Ctrl+S), or close the window again";
+            self.messages.add(&[Note::failure(text)], now);
+        }
+        self.is_warned = self.news.is_unsaved;
+        !self.news.is_unsaved || is_warned
+    }
+
     /// Says something that happened outside.
-    pub(super) fn say(&mut self, note: super::news::Note, now: f64) {
+    pub(super) fn say(&mut self, note: Note, now: f64) {
         self.messages.add(&[note], now);
     }
 
@@ -221,7 +244,8 @@ impl Interface {
 
     fn order_wishes(&mut self) {
         self.moment = None;
-        self.orders.push(Order::Ask(Box::new(self.wishes.clone())));
+        let serial = self.news.picture.as_ref().map_or(0, |picture| picture.serial);
+        self.orders.push(Order::Ask(Box::new(Ask { wishes: self.wishes.clone(), serial })));
     }
 
     fn undo(&mut self) {

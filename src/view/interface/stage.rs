@@ -226,7 +226,10 @@ impl Interface {
                             ));
                             ui.label(match fitness {
                                 Some(fitness) => format!("marginal fitness {fitness:+}"),
-                                None => "marginal fitness: known of the present, not of the past".to_owned(),
+                                None if self.moment.is_some() => {
+                                    "marginal fitness: known of the present only".to_owned()
+                                }
+                                None => "marginal fitness: not known yet".to_owned(),
                             });
                         });
                     });
@@ -277,11 +280,10 @@ impl Interface {
         if picture.rgba.is_empty() {
             return None;
         }
-        let mark = Arc::as_ptr(picture) as usize;
-        if self.photo.as_ref().is_none_or(|(known, _)| *known != mark) {
+        if self.photo.as_ref().is_none_or(|(known, _)| !Arc::ptr_eq(known, picture)) {
             let [width, height] = picture.size.map(|side| side as usize);
             let image = ColorImage::from_rgba_unmultiplied([width, height], &picture.rgba);
-            self.photo = Some((mark, ui.ctx().load_texture("photo", image, TextureOptions::NEAREST)));
+            self.photo = Some((Arc::clone(picture), ui.ctx().load_texture("photo", image, TextureOptions::NEAREST)));
         }
         self.photo.as_ref().map(|(_, texture)| texture.id())
     }
@@ -292,16 +294,15 @@ impl Interface {
         if errors.len() != width * height || self.moment.is_some() {
             return None;
         }
-        let mark = Arc::as_ptr(&errors) as usize;
-        if self.error.as_ref().is_none_or(|(known, _)| *known != mark) {
+        if self.error.as_ref().is_none_or(|(known, _)| !Arc::ptr_eq(known, &errors)) {
             let pixels = errors.iter().map(|&error| looks::error_color(error)).collect();
             let image = ColorImage::new([width, height], pixels);
             match &mut self.error {
                 Some((known, texture)) => {
-                    *known = mark;
+                    *known = errors;
                     texture.set(image, TextureOptions::NEAREST);
                 }
-                None => self.error = Some((mark, ui.ctx().load_texture("error", image, TextureOptions::NEAREST))),
+                None => self.error = Some((errors, ui.ctx().load_texture("error", image, TextureOptions::NEAREST))),
             }
         }
         self.error.as_ref().map(|(_, texture)| texture.id())

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use egui::accesskit::Role;
-use egui::{Key, Modifiers, pos2, vec2};
+use egui::{Key, Modifiers, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 
@@ -28,9 +28,9 @@ fn news(doing: Doing) -> News {
     let moment = |evals, error| Moment { evals, error, tiles: Arc::clone(&tiles) };
     let course = Arc::new(vec![moment(0, 90.0), moment(500, 40.0), moment(1_000, 20.0)]);
     let picture = PictureNews {
+        serial: 1,
         name: "woman.jpg".to_owned(),
         path: Some(PathBuf::from("photos/woman.jpg")),
-        original: [600, 400],
         size: SIZE,
         rgba: vec![200; 60 * 40 * 4],
     };
@@ -74,7 +74,7 @@ fn press(window: &mut Window, key: Key) {
 /// The wishes of the last order that has any.
 fn asked(window: &mut Window) -> Option<Wishes> {
     let orders = window.state_mut().take_orders();
-    orders.into_iter().rev().find_map(|order| if let Order::Ask(wishes) = order { Some(*wishes) } else { None })
+    orders.into_iter().rev().find_map(|order| if let Order::Ask(ask) = order { Some(ask.wishes) } else { None })
 }
 
 fn orders(window: &mut Window) -> Vec<Order> {
@@ -208,7 +208,8 @@ fn the_search_pauses_steps_goes_on_and_begins_anew() {
     click(&mut window, "Pause");
     press(&mut window, Key::Space);
     click(&mut window, "Step");
-    press(&mut window, Key::R);
+    window.key_press_modifiers(Modifiers::COMMAND, Key::R);
+    window.run();
     let given = orders(&mut window);
     assert!(matches!(&given[..], [Order::Pause, Order::Pause, Order::Step, Order::Restart]), "{}", given.len());
     window.state_mut().hear(news(Doing::Paused), 1.0);
@@ -411,6 +412,17 @@ fn dialogs_of_the_desktop_are_asked_for_where_there_are_any() {
 }
 
 #[test]
+fn a_steered_mosaic_is_not_lost_by_one_click() {
+    let mut window = window();
+    assert!(window.state_mut().may_close(0.0), "nothing would be lost");
+    window.state_mut().hear(News { is_unsaved: true, ..news(Doing::Running) }, 0.0);
+    assert!(!window.state_mut().may_close(0.0));
+    window.step();
+    assert!(window.state().messages.texts()[0].contains("is not saved"));
+    assert!(window.state_mut().may_close(0.0), "who asks twice means it");
+}
+
+#[test]
 fn everything_has_a_name_for_those_who_do_not_see() {
     let window = window();
     for node in window.root().children_recursive() {
@@ -420,5 +432,4 @@ fn everything_has_a_name_for_those_who_do_not_see() {
             assert!(named, "{:?} at {:?} has no name", node.role(), node.bounding_box());
         }
     }
-    let _ = pos2(0.0, 0.0);
 }
