@@ -43,8 +43,18 @@ impl Viewer {
             .spawn()
             .expect("the program starts");
         let window = display.window("- smalti", || process.try_wait().expect("it can be asked").is_none());
-        let place = Command::new("xwininfo").args(["-id", &window, "-display", display.name()]).output();
-        let place = String::from_utf8_lossy(&place.expect("xwininfo runs").stdout).into_owned();
+        let told = || {
+            let told = Command::new("xwininfo").args(["-id", &window, "-display", display.name()]).output();
+            String::from_utf8_lossy(&told.expect("xwininfo runs").stdout).into_owned()
+        };
+        // It has a number before it is on the screen and has its place.
+        let began = Instant::now();
+        while !told().contains("IsViewable") {
+            assert!(began.elapsed() < Duration::from_secs(120), "the window is never shown");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        std::thread::sleep(Duration::from_millis(500));
+        let place = told();
         let number = |name: &str| -> u32 {
             let line = place.lines().find(|line| line.contains(name)).expect("xwininfo tells it");
             line.rsplit(' ').next().and_then(|word| word.parse().ok()).expect("it is a number")
