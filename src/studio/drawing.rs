@@ -1,5 +1,8 @@
 //! A population drawn and encoded: at what size, what of it has to be drawn for which content, and the bytes.
 
+use std::ffi::OsStr;
+use std::path::Path;
+
 use super::provenance::{self, Told};
 use crate::archive;
 use crate::error::{Error, Result};
@@ -41,6 +44,22 @@ pub(crate) enum Content {
 impl Content {
     /// A picture as JPEG of the usual quality.
     pub(crate) const JPEG: Self = Self::Jpeg(JPEG_QUALITY);
+
+    /// What is written to a path, as its ending tells.
+    pub(crate) fn of_path(path: &Path) -> Option<Self> {
+        let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
+        Some(match ending.as_str() {
+            "png" => Self::Png,
+            "jpg" | "jpeg" => Self::JPEG,
+            "webp" => Self::WebP,
+            "svg" => Self::Svg,
+            "ora" => Self::OpenRaster,
+            "npz" => Self::Population,
+            "json" => Self::Json,
+            "csv" => Self::Csv,
+            _ => return None,
+        })
+    }
 
     /// Whether it is a picture, which has a size, rather than a population, which has none.
     pub(crate) fn is_picture(self) -> bool {

@@ -236,6 +236,19 @@ impl Mosaic {
         self.drawn.population.background == Backdrop::Transparent
     }
 
+    /// As a file of this content.
+    ///
+    /// # Errors
+    /// As the method of the format.
+    #[cfg(feature = "view")]
+    pub(crate) fn encode_as(&self, content: Content) -> Result<Vec<u8>> {
+        match content {
+            Content::WebP => self.webp(),
+            Content::OpenRaster => self.ora(),
+            content => self.encode(content),
+        }
+    }
+
     fn encode(&self, content: Content) -> Result<Vec<u8>> {
         self.drawn.encode(content, &self.told())
     }

@@ -1,6 +1,6 @@
 //! The event loop: input goes to the interface, orders to the worker, tiles to the device, and frames to the screen.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
@@ -251,8 +251,8 @@ impl App {
         }
     }
 
-    fn remember_folder(&mut self, path: &std::path::Path) {
-        self.remembered.folder = path.parent().map(std::path::Path::to_owned);
+    fn remember_folder(&mut self, path: &Path) {
+        self.remembered.folder = path.parent().map(Path::to_owned);
     }
 
     /// Takes the picture that lies in the clipboard, if one does.
@@ -330,12 +330,12 @@ impl Shown {
     /// Draws the tiles where they changed or are seen from elsewhere; whether the interface must learn of a new image.
     fn draw_mosaic(&mut self, interface: &Interface) -> Result<bool> {
         let (Some(tiles), Some(wanted)) = (interface.tiles(), interface.wanted) else { return Ok(false) };
-        let is_drawn = |(drawn, view): &(Arc<Population>, LiveView)| Arc::ptr_eq(drawn, tiles) && *view == wanted.view;
+        let is_drawn = |(drawn, view): &(Arc<Population>, LiveView)| Arc::ptr_eq(drawn, tiles) && *view == wanted;
         if self.drawn.as_ref().is_some_and(is_drawn) {
             return Ok(false);
         }
-        let image = self.mosaic.draw(tiles, &wanted.view)?;
-        self.drawn = Some((Arc::clone(tiles), wanted.view));
+        let image = self.mosaic.draw(tiles, &wanted)?;
+        self.drawn = Some((Arc::clone(tiles), wanted));
         self.drawn_frames += 1;
         if self.image.as_ref().is_some_and(|(_, known)| Arc::ptr_eq(known, &image)) {
             return Ok(false);

@@ -6,7 +6,7 @@ use super::news::SaveOrder;
 use super::opened::Open;
 use crate::error::{Error, Result};
 use crate::output;
-use crate::studio::{Device, Mosaic, Script, Session, quoted};
+use crate::studio::{Content, Device, Mosaic, Script, Session, quoted};
 
 /// Draws the tiles of the first file into the second, with a longer side in px or as they evolved.
 pub(crate) type Redraw = fn(&Path, &Path, Option<u32>) -> Result<()>;
@@ -51,22 +51,11 @@ pub(super) fn save(
 
 /// The bytes of a mosaic in the format that the ending of a path names.
 fn encoded(mosaic: &Mosaic, path: &Path) -> Result<Vec<u8>> {
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    match ending.as_str() {
-        "png" => mosaic.png(),
-        "jpg" | "jpeg" => mosaic.jpeg(),
-        "webp" => mosaic.webp(),
-        "svg" => mosaic.svg(),
-        "ora" => mosaic.ora(),
-        "npz" => mosaic.npz(),
-        "csv" => mosaic.csv(),
-        "json" => mosaic.json(),
-        _ => Err(Error::Output {
-            path: path.to_owned(),
-            reason: "has no ending that is known; end it with .png, .jpg, .webp, .svg, .ora, .npz, .csv or .json"
-                .to_owned(),
-        }),
-    }
+    let unknown = || Error::Output {
+        path: path.to_owned(),
+        reason: "does not end in a format; choose one in the form".to_owned(),
+    };
+    mosaic.encode_as(Content::of_path(path).ok_or_else(unknown)?)
 }
 
 /// Whether flags alone ask for the same mosaic: it was not steered, nor ended by hand.

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
+use crate::evolve::cells::EVALS_PER_FLY;
+use crate::evolve::style::Style;
 use crate::model::Rgb;
 use crate::shapes::Shader;
-
-/// Evals for each tile, unless something else is wished for.
-pub(super) const EVALS_PER_TILE: u64 = 400;
+use crate::studio::LONG_SIDE_PX;
 
 /// How tiles lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,6 +105,27 @@ pub(super) struct BoundWishes {
     pub turn: Option<u32>,
 }
 
+/// The bounds that a style has by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct UsualBounds {
+    pub side: [f64; 2],
+    pub aspect: f64,
+    pub overlap: u32,
+    pub hole: u32,
+    pub turn: u32,
+}
+
+impl UsualBounds {
+    /// Those of a style, to a hundredth.
+    pub(super) fn of(style: StyleWish) -> Self {
+        let Style { side_min_q8, side_max_q8, aspect_max_q8, overlap, hole, turn, .. } =
+            Style::named(style.name()).unwrap_or_else(Style::free);
+        let decimal = |q8: u32| (f64::from(q8) / 256.0 * 100.0).round() / 100.0;
+        let side = [decimal(side_min_q8).max(0.01), decimal(side_max_q8)];
+        Self { side, aspect: decimal(aspect_max_q8), overlap, hole, turn }
+    }
+}
+
 /// Where likeness matters: a luma for each pixel of the fitted picture.
 #[derive(Clone, PartialEq, Eq)]
 pub(super) struct WeightMap {
@@ -160,8 +181,8 @@ impl Default for Wishes {
         Self {
             style: StyleWish::default(),
             tiles: None,
-            size: 512,
-            evals_per_tile: EVALS_PER_TILE,
+            size: LONG_SIDE_PX,
+            evals_per_tile: EVALS_PER_FLY,
             seed: 0,
             masks: Vec::new(),
             shader: None,

@@ -13,9 +13,10 @@ use super::opened::{Open, Origin, pasted};
 use super::opening::{self, Found, Snapshots};
 use super::rescue;
 use super::saving::{self, Redraw};
-use super::wishes::{EVALS_PER_TILE, Wishes};
+use super::wishes::Wishes;
 use crate::cpu::CpuPainter;
 use crate::error::{Error, Result};
+use crate::evolve::cells::EVALS_PER_FLY;
 use crate::model::{Canvas, Painter, Population, Rgb};
 use crate::studio::{Device, Picture, Script, Session, Step, WrittenRecipe};
 
@@ -248,7 +249,7 @@ impl<'d> Worker<'d> {
     fn put_on(&mut self, (session, written): (Session<'d>, WrittenRecipe)) {
         let input_sha256 = self.open.as_ref().map(|open| open.picture.sha256().to_owned()).unwrap_or_default();
         self.script = Script { input_sha256, steps: vec![Step { evals: 0, recipe: written }], until: None };
-        self.usual_evals = EVALS_PER_TILE * session.fly_count() as u64;
+        self.usual_evals = EVALS_PER_FLY * session.fly_count() as u64;
         self.session = Some(session);
         self.course = Course::default();
         self.clock = (Instant::now(), 0);

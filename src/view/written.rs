@@ -1,9 +1,11 @@
 //! Wishes as a recipe that a file can hold.
 
 use super::interface::encoded_map;
-use super::wishes::{ColorWish, EVALS_PER_TILE, GroundWish, GroutWish, MaskWish, Wishes};
+use super::wishes::{ColorWish, GroundWish, GroutWish, MaskWish, Wishes};
 use crate::error::Result;
+use crate::evolve::cells::EVALS_PER_FLY;
 use crate::model::Rgb;
+use crate::photo::fitted_size;
 use crate::studio::{
     CarriedMask, LONG_SIDE_PX, MaskKind, WrittenBounds, WrittenMask, WrittenRecipe, default_fly_count, hexadecimal,
 };
@@ -31,7 +33,7 @@ impl Wishes {
             tiles: self.tiles,
             size: Some(self.size).filter(|&size| size != LONG_SIDE_PX),
             seed: Some(self.seed).filter(|&seed| seed != 0),
-            evals: (self.evals_per_tile != EVALS_PER_TILE).then(|| self.evals_per_tile.saturating_mul(tiles)),
+            evals: (self.evals_per_tile != EVALS_PER_FLY).then(|| self.evals_per_tile.saturating_mul(tiles)),
             colors: few,
             palette: palette.iter().map(|color| hexadecimal(color)).collect(),
             background: match self.ground {
@@ -55,10 +57,9 @@ impl Wishes {
 }
 
 /// As many tiles as there are where nobody says a number.
-fn usual_tiles((width_px, height_px): (u32, u32), size: u64) -> u64 {
-    let long = u64::from(width_px.max(height_px)).max(1);
-    let side = |px: u32| u32::try_from((u64::from(px) * size.min(long)).div_ceil(long)).unwrap_or(px).max(1);
-    default_fly_count(side(width_px), side(height_px)) as u64
+fn usual_tiles(picture: (u32, u32), size: u64) -> u64 {
+    let (width_px, height_px) = fitted_size(picture, u32::try_from(size).ok());
+    default_fly_count(width_px, height_px) as u64
 }
 
 fn written_mask(mask: &MaskWish) -> WrittenMask {

@@ -91,21 +91,9 @@ impl Destination {
     }
 }
 
-/// What is written to a path, as its ending tells.
+/// What is written to a path: as its ending tells, and a PNG to stdout.
 fn content_of(path: &Path) -> Option<Content> {
-    let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
-    Some(match ending.as_str() {
-        "png" => Content::Png,
-        "jpg" | "jpeg" => Content::JPEG,
-        "webp" => Content::WebP,
-        "svg" => Content::Svg,
-        "ora" => Content::OpenRaster,
-        "npz" => Content::Population,
-        "json" => Content::Json,
-        "csv" => Content::Csv,
-        _ if path == Path::new("-") => Content::Png,
-        _ => return None,
-    })
+    Content::of_path(path).or_else(|| (path == Path::new("-")).then_some(Content::Png))
 }
 
 /// What has to be drawn for these outputs.

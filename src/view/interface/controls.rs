@@ -4,12 +4,13 @@ use egui::{Checkbox, CollapsingHeader, ComboBox, DragValue, Response, RichText, 
 
 use super::Interface;
 use super::course::grouped;
+use crate::evolve::cells::EVALS_PER_FLY;
 use crate::model::Rgb;
 use crate::model::population::FLY_COUNT_MAX;
 use crate::photo;
 use crate::shapes::Shader;
 use crate::view::news::Note;
-use crate::view::wishes::{ColorWish, EVALS_PER_TILE, GroundWish, GroutWish, StyleWish, Wishes};
+use crate::view::wishes::{ColorWish, GroundWish, GroutWish, StyleWish, UsualBounds, Wishes};
 
 /// Most px of the longer side at which a picture evolves here.
 const SIZE_MAX: u64 = 4_096;
@@ -211,18 +212,21 @@ fn color_button(ui: &mut Ui, color: &mut Rgb, name: &str) -> Response {
 
 fn show_bounds(ui: &mut Ui, wishes: &mut Wishes) {
     ui.weak("Lengths are multiples of the mean side of a tile.");
+    let usual = UsualBounds::of(wishes.style);
     let bounds = &mut wishes.bounds;
-    optional(ui, &mut bounds.side, [0.6, 1.6], "sides", "Smallest and largest side of a tile", |ui, side| {
+    optional(ui, &mut bounds.side, usual.side, "sides", "Smallest and largest side of a tile", |ui, side| {
         let [low, high] = side;
         let smallest = ui.add(DragValue::new(low).range(0.01..=*high).speed(0.01));
         smallest | ui.add(DragValue::new(high).range(*low..=16.0).speed(0.01))
     });
     let hint = "Largest ratio of the sides: 1 is square";
-    optional(ui, &mut bounds.aspect, 1.6, "slimness", hint, |ui, aspect| ui.add(Slider::new(aspect, 1.0..=16.0)));
+    optional(ui, &mut bounds.aspect, usual.aspect, "slimness", hint, |ui, aspect| {
+        ui.add(Slider::new(aspect, 1.0..=64.0).logarithmic(true))
+    });
     for (bound, usual, name, hint) in [
-        (&mut bounds.overlap, 20, "overlap", "How much it costs that tiles lie on each other"),
-        (&mut bounds.hole, 120, "gaps", "How much it costs that a pixel is covered by no tile"),
-        (&mut bounds.turn, 60, "turning", "How much it costs that a tile turns away from the contours"),
+        (&mut bounds.overlap, usual.overlap, "overlap", "How much it costs that tiles lie on each other"),
+        (&mut bounds.hole, usual.hole, "gaps", "How much it costs that a pixel is covered by no tile"),
+        (&mut bounds.turn, usual.turn, "turning", "How much it costs that a tile turns away from the contours"),
     ] {
         optional(ui, bound, usual, name, hint, |ui, cost| ui.add(Slider::new(cost, 0..=255)));
     }
@@ -233,7 +237,7 @@ fn show_search(ui: &mut Ui, wishes: &mut Wishes) {
     ui.add(Slider::new(&mut wishes.size, 32..=SIZE_MAX).logarithmic(true).suffix(" px").text("size"))
         .on_hover_text(hint);
     let hint = "Tries for each tile: more is closer to the picture and takes more time";
-    let effort = Slider::new(&mut wishes.evals_per_tile, 10..=EVALS_PER_TILE * 20).logarithmic(true).text("effort");
+    let effort = Slider::new(&mut wishes.evals_per_tile, 10..=EVALS_PER_FLY * 20).logarithmic(true).text("effort");
     ui.add(effort).on_hover_text(hint);
     ui.horizontal(|ui| {
         let hint = "The number that decides every random choice";

@@ -38,13 +38,7 @@ pub(super) struct Drawn {
     pub image: [u32; 2],
 }
 
-/// What the stage shows of the mosaic, for whoever draws it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Wanted {
-    pub view: LiveView,
-}
-
-/// What happens outside: files that were dropped, dialogs that are open.
+/// What the desktop is asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Request {
     /// Choose a file to open by a dialog of the desktop.
@@ -82,8 +76,8 @@ pub(super) struct Interface {
     pub has_dialogs: bool,
     orders: Vec<Order>,
     requests: Vec<Request>,
-    /// What the stage showed last.
-    pub wanted: Option<Wanted>,
+    /// What the stage showed of the mosaic last, for whoever draws it.
+    pub wanted: Option<LiveView>,
     /// Size of the picture, and the stage in physical pixels.
     on_stage: Option<([u32; 2], Rect)>,
     hovered: Option<usize>,

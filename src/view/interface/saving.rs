@@ -7,6 +7,7 @@ use egui::{ComboBox, Key, Slider, TextEdit, Ui};
 use super::files::typed;
 use super::{Interface, Request};
 use crate::model::target::TARGET_SIDE_MAX_PX;
+use crate::studio::Content;
 use crate::view::news::{Order, SaveOrder};
 
 /// The formats: ending, and what it is for.
@@ -20,8 +21,11 @@ const FORMATS: [(&str, &str); 8] = [
     ("csv", "a table of the tiles"),
     ("json", "the tiles for programs"),
 ];
-/// Formats of tiles, which have no size.
-const WITHOUT_SIZE: [&str; 3] = ["npz", "csv", "json"];
+
+/// The content of a file with this ending.
+fn content_of(format: &str) -> Option<Content> {
+    Content::of_path(&Path::new("mosaic").with_extension(format))
+}
 
 /// What the form holds.
 pub(super) struct SaveForm {
@@ -55,14 +59,12 @@ impl SaveForm {
         self.replaces = Some(path.to_owned());
     }
 
-    fn ending(&self) -> String {
-        let ending =
-            Path::new(self.path.trim()).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
-        ending.unwrap_or_default()
+    fn content(&self) -> Option<Content> {
+        Content::of_path(&typed(&self.path))
     }
 
     fn has_size(&self) -> bool {
-        !WITHOUT_SIZE.contains(&self.ending().as_str())
+        self.content().is_some_and(Content::is_picture)
     }
 }
 
@@ -105,13 +107,12 @@ impl Interface {
     }
 
     fn show_save_format(&mut self, ui: &mut Ui) {
-        let ending = self.save.ending();
-        let ending = if ending == "jpeg" { "jpg".to_owned() } else { ending };
-        let known = FORMATS.iter().find(|(known, _)| *known == ending);
-        let chosen = known.map_or("choose one", |(known, _)| known);
+        let content = self.save.content();
+        let is_chosen = |format: &str| content.is_some() && content == content_of(format);
+        let chosen = FORMATS.iter().find(|(format, _)| is_chosen(format)).map_or("choose one", |(format, _)| format);
         ComboBox::from_label("format").selected_text(chosen).show_ui(ui, |ui| {
             for (format, what) in FORMATS {
-                if ui.selectable_label(ending == format, format!("{format}: {what}")).clicked() {
+                if ui.selectable_label(is_chosen(format), format!("{format}: {what}")).clicked() {
                     let path = typed(&self.save.path).with_extension(format);
                     self.save.path = path.display().to_string();
                     self.save.replaces = None;
@@ -134,7 +135,7 @@ impl Interface {
 
     fn show_save_button(&mut self, ui: &mut Ui) {
         let path = typed(&self.save.path);
-        let is_known = FORMATS.iter().any(|(format, _)| *format == self.save.ending()) || self.save.ending() == "jpeg";
+        let is_known = self.save.content().is_some();
         let is_ready = is_known && self.news.tiles.is_some() && !self.news.is_saving;
         let must_ask = path.exists() && self.save.replaces.as_deref() != Some(&path);
         ui.horizontal(|ui| {
@@ -159,5 +160,16 @@ impl Interface {
         let long_side_px = self.save.long_side_px.filter(|_| self.save.has_size());
         self.orders.push(Order::Save(SaveOrder { path, long_side_px }));
         (self.save.is_open, self.save.replaces) = (false, None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_format_that_is_offered_is_written() {
+        let contents: Vec<_> = FORMATS.iter().map(|(format, _)| content_of(format)).collect();
+        assert!(contents.iter().all(Option::is_some), "{contents:?}");
     }
 }

@@ -7,7 +7,7 @@ use egui::{
     TextureId, TextureOptions, Ui, Vec2, pos2, vec2,
 };
 
-use super::{Drawn, Interface, Wanted, looks};
+use super::{Drawn, Interface, looks};
 use crate::model::Population;
 use crate::view::camera::Framed;
 use crate::view::news::{Doing, PictureNews};
@@ -80,7 +80,7 @@ impl Interface {
         let in_points = |rect: Rect| Rect::from_min_max(rect.min / ppp, rect.max / ppp);
         let whole = in_points(framed.picture);
         if let Some((view, place)) = framed.visible() {
-            self.wanted = Some(Wanted { view });
+            self.wanted = Some(view);
             show_checkers(&painter, whole.intersect(rect), ui.visuals().dark_mode);
             let mosaic = drawn.filter(|_| self.tiles().is_some()).map(|drawn| {
                 let used =

@@ -259,10 +259,7 @@ fn photo_divider_and_error_are_one_key_or_button_away() {
 #[test]
 fn the_stage_is_panned_zoomed_and_fitted() {
     let mut window = window();
-    let scale = |window: &Window| {
-        let view = window.state().wanted.expect("the mosaic is on the stage").view;
-        view.canvas.width_px
-    };
+    let scale = |window: &Window| window.state().wanted.expect("the mosaic is on the stage").canvas.width_px;
     let fitted = scale(&window);
     press(&mut window, Key::Plus);
     assert!(scale(&window) > fitted);
