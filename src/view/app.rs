@@ -15,7 +15,7 @@ use winit::window::{Window, WindowId};
 
 use super::dialogs::{self, Answer, Purpose};
 use super::interface::{Drawn, Interface, Request, looks};
-use super::news::{Desk, News, Note, Order};
+use super::news::{Desk, News, Note, Order, Standing};
 use super::remembered::Remembered;
 use super::wishes::Wishes;
 use super::worker::{Tools, work};
@@ -285,7 +285,7 @@ impl App {
 
     /// Ends the worker. Where the window ended by a failure, the tiles are saved.
     fn end(self, worker: JoinHandle<Result<()>>, ended: Result<()>) -> Result<Figures> {
-        let Self { desk, orders, failure, shown, began, figures, .. } = self;
+        let Self { desk, orders, failure, shown, figures, .. } = self;
         let log = shown.as_ref().map(|shown| Arc::clone(shown.screen.validation_log()));
         drop(shown);
         // If it is gone already, it needs no order.
@@ -297,8 +297,8 @@ impl App {
         let news: News = desk.fetch();
         let Err(error) = ended else {
             log.as_deref().map_or(Ok(()), check_messages)?;
-            let watched = began.elapsed().saturating_sub(figures.first_tiles.unwrap_or_default());
-            return Ok(Figures { watched, evals: news.standing.evals, ..figures });
+            let Standing { evals, evals_per_s, .. } = news.standing;
+            return Ok(Figures { evals, evals_per_s, ..figures });
         };
         Err(match rescue::rescue(&news) {
             Ok(Some(path)) => Error::Rescued { error: Box::new(error), path },

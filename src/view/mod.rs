@@ -56,10 +56,10 @@ pub(crate) struct Figures {
     pub frames: u64,
     /// From the start until the first tiles were on the screen.
     pub first_tiles: Option<Duration>,
-    /// From there until the window was closed.
-    pub watched: Duration,
     /// Evals of the last run.
     pub evals: u64,
+    /// How fast they were made since the search was last set going, until it rested or ended.
+    pub evals_per_s: f64,
 }
 
 /// Opens the window and returns when it is closed.

@@ -20,8 +20,8 @@ use crate::evolve::cells::EVALS_PER_FLY;
 use crate::model::{Canvas, Painter, Population, Rgb};
 use crate::studio::{Device, Picture, Script, Session, Step, WrittenRecipe};
 
-/// Time between two pieces of news about the tiles: a smooth display, of which a search on the same processors hardly
-/// takes notice (`tools/measure-window`).
+/// Time between two pieces of news about the tiles: about ten frames a second. What they cost a search on the same
+/// processors, benches/results/2026-11-window.md tells.
 const BETWEEN_NEWS: Duration = Duration::from_millis(90);
 /// How often a search that rests looks whether the window wants to know more.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(80);

@@ -63,12 +63,10 @@ fn open(args: &ViewArgs, redraw: Redraw) -> Result<()> {
         redraw,
     })?;
     if args.verbose {
-        let Figures { frames, first_tiles, watched, evals } = figures;
-        let seconds = watched.as_secs_f64();
+        let Figures { frames, first_tiles, evals, evals_per_s } = figures;
         let first = first_tiles.map_or_else(|| "never".to_owned(), |time| format!("after {:.2} s", time.as_secs_f64()));
-        let per_s = frames as f64 / seconds.max(1e-9);
-        terminal::say(&format!("first tiles {first}; then {frames} frames in {seconds:.1} s, {per_s:.1} a second"));
-        terminal::say(&format!("{evals} evals in the last run"));
+        terminal::say(&format!("first tiles {first}; the mosaic was drawn {frames} times"));
+        terminal::say(&format!("{evals} evals in the last run, {evals_per_s:.0} a second"));
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ use egui::{
 };
 
 use super::{Drawn, Interface, looks};
-use crate::model::Population;
+use crate::model::{Backdrop, Population};
 use crate::view::camera::Framed;
 use crate::view::news::{Doing, PictureNews};
 use crate::view::pick;
@@ -81,7 +81,11 @@ impl Interface {
         let whole = in_points(framed.picture);
         if let Some((view, place)) = framed.visible() {
             self.wanted = Some(view);
-            show_checkers(&painter, whole.intersect(rect), ui.visuals().dark_mode);
+            let is_clear = |tiles: &Arc<Population>| tiles.background == Backdrop::Transparent;
+            // Opaque tiles hide it, and software Vulkan would paint every square of it.
+            if self.tiles().is_none_or(is_clear) {
+                show_checkers(&painter, whole.intersect(rect), ui.visuals().dark_mode);
+            }
             let mosaic = drawn.filter(|_| self.tiles().is_some()).map(|drawn| {
                 let used =
                     vec2(view.width_px as f32 / drawn.image[0] as f32, view.height_px as f32 / drawn.image[1] as f32);
