@@ -5,7 +5,6 @@
 
 #include "shared/tile.glsl"
 
-layout(std430, binding = 0) readonly buffer Tiles { Tile tiles[]; };
 layout(binding = 2) uniform utexture2DArray masks;
 
 layout(push_constant) uniform Push {
@@ -19,13 +18,28 @@ layout(push_constant) uniform Push {
 // 1: tiles have a ring of grout.
 layout(constant_id = 0) const uint GROUTED = 0u;
 
-layout(location = 0) flat in uint fly;
-layout(location = 1) flat in uint rank;
+layout(location = 0) flat in uvec4 place;
+layout(location = 1) flat in uvec4 steps;
+layout(location = 2) flat in uvec4 look;
+layout(location = 3) flat in uvec4 names;
 layout(location = 0) out vec4 color;
 layout(location = 1) out uint shown_fly;
 
 void main() {
-    Tile tile = tiles[fly];
+    Tile tile;
+    tile.x0 = int(place.x);
+    tile.y0 = int(place.y);
+    tile.u0 = int(place.z);
+    tile.v0 = int(place.w);
+    tile.cos_step = int(steps.x);
+    tile.sin_step = int(steps.y);
+    tile.w = steps.z;
+    tile.h = steps.w;
+    tile.color = look.x;
+    tile.w_inverse = look.y;
+    tile.h_inverse = look.z;
+    tile.ring = look.w;
+    tile.mask = names.z;
     ivec2 pixel = ivec2(gl_FragCoord.xy) + push.origin;
     uvec2 uv = tile_coordinates(tile, pixel.x, pixel.y);
     if (!is_inside(tile, uv)) {
@@ -43,7 +57,7 @@ void main() {
         shown = push.grout;
     }
     color = vec4(uvec3(shown, shown >> 8, shown >> 16) & 255u, 255.0) / 255.0;
-    shown_fly = fly;
+    shown_fly = names.x;
     // Ranks are below 2^24, so each is a different float.
-    gl_FragDepth = float(rank) / 16777216.0;
+    gl_FragDepth = float(names.y) / 16777216.0;
 }

@@ -1,6 +1,12 @@
-// One quad per tile, a pixel larger than the tile on each side: the fragment stage decides coverage exactly.
-// Twin (with mosaic.frag): src/cpu/mosaic.rs.
+// One quad per tile, a pixel larger than the tile on each side: the fragment stage decides coverage exactly. What that
+// needs of the tile goes along, since software Vulkan loads it anew for each pixel otherwise, which costs more than all
+// else of a mosaic. Twin (with mosaic.frag): src/cpu/mosaic.rs.
 #version 460
+#extension GL_GOOGLE_include_directive : require
+
+#include "shared/tile.glsl"
+
+layout(std430, binding = 0) readonly buffer Tiles { Tile tiles[]; };
 
 struct Instance {
     vec2 axis_u;
@@ -21,8 +27,10 @@ layout(push_constant) uniform Push {
     uint grout;
 } push;
 
-layout(location = 0) flat out uint fly;
-layout(location = 1) flat out uint rank;
+layout(location = 0) flat out uvec4 place;
+layout(location = 1) flat out uvec4 steps;
+layout(location = 2) flat out uvec4 look;
+layout(location = 3) flat out uvec4 names;
 
 void main() {
     Instance instance = instances[gl_InstanceIndex];
@@ -31,6 +39,9 @@ void main() {
     // Pixel (i, j) of the canvas has its centre at (i, j); the framebuffer has it at (i + 1/2, j + 1/2).
     vec2 clip = (position - vec2(push.origin) + 0.5) * push.pixel_size - 1.0;
     gl_Position = vec4(clip, 0.0, 1.0);
-    fly = instance.fly;
-    rank = instance.rank;
+    Tile tile = tiles[instance.fly];
+    place = uvec4(tile.x0, tile.y0, tile.u0, tile.v0);
+    steps = uvec4(tile.cos_step, tile.sin_step, tile.w, tile.h);
+    look = uvec4(tile.color, tile.w_inverse, tile.h_inverse, tile.ring);
+    names = uvec4(instance.fly, instance.rank, tile.mask, 0);
 }

@@ -122,6 +122,9 @@ pub enum Error {
         /// What the system said.
         reason: String,
     },
+    /// The display went away while a window was on it.
+    #[error("the display of the window is gone")]
+    DisplayLost,
     /// The window ended by a failure, and what it showed was saved.
     #[error("{error}; the tiles were saved as {}", path.display())]
     Rescued {

@@ -24,6 +24,8 @@ use crate::model::target::hexadecimal;
 use crate::model::{Backdrop, Blend, Canvas, Fly, Population};
 use crate::photo::{self, xml};
 
+#[cfg(feature = "view")]
+pub(crate) use outline::outline;
 use shapes::Shapes;
 use tiles::push_fly;
 

@@ -11,41 +11,42 @@ const STEPS: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
 /// For each step from a corner, the texel ahead on the right and the one ahead on the left.
 const AHEAD: [[(i32, i32); 2]; 4] = [[(0, 0), (0, -1)], [(-1, 0), (0, 0)], [(-1, -1), (-1, 0)], [(0, -1), (-1, -1)]];
 
-/// The solid texels of `mask` as SVG path data, for either fill rule; empty if there are none.
+/// The corners of a polygon in order.
+type Polygon = Vec<(i32, i32)>;
+
+/// Polygons around the texels of `mask` with at least this coverage; none if there are no such texels.
 ///
-/// A texel is one unit and the mask's centre the origin. Each polygon has solid texels on its right, and a corner only
+/// A texel is one unit and the mask's centre the origin. Each polygon has those texels on its right, and a corner only
 /// where it turns.
-pub(super) fn outline(mask: &Mask) -> String {
+pub(crate) fn outline(mask: &Mask, covered_from: u8) -> Vec<Polygon> {
     let is_solid = |column: i32, row: i32| {
         let is_inside = (0..SIDE).contains(&column) && (0..SIDE).contains(&row);
-        is_inside && mask.texel(column as u32, row as u32).coverage >= COVERAGE_THRESHOLD
+        is_inside && mask.texel(column as u32, row as u32).coverage >= covered_from
     };
     let is_top = |x: i32, y: i32| is_solid(x, y) && !is_solid(x, y - 1);
     let mut seen = vec![false; MASK_SIDE * MASK_SIDE];
-    let mut path = String::new();
+    let mut polygons = Vec::new();
     // Every polygon has upper sides, so this scan finds it at the leftmost texel of the highest one.
     for (y, x) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (y, x))) {
         if is_top(x, y) && !seen[(y * SIDE + x) as usize] {
-            push_polygon(&mut path, (x, y), &is_solid, &mut seen);
+            polygons.push(polygon((x, y), &is_solid, &mut seen));
         }
     }
-    path
+    polygons
 }
 
 /// Walks around the polygon whose upper side leaves `start` to the right, and marks the texels of its upper sides.
-fn push_polygon(path: &mut String, start: (i32, i32), is_solid: &impl Fn(i32, i32) -> bool, seen: &mut [bool]) {
+fn polygon(start: (i32, i32), is_solid: &impl Fn(i32, i32) -> bool, seen: &mut [bool]) -> Polygon {
     let half = SIDE / 2;
     let (mut x, mut y) = start;
     let mut direction = 0;
-    let mut length = 0;
-    write!(path, "M{} {}", x - half, y - half).expect("a string takes everything");
+    let mut corners = vec![(x - half, y - half)];
     loop {
         if direction == 0 {
             seen[(y * SIDE + x) as usize] = true;
         }
         x += STEPS[direction].0;
         y += STEPS[direction].1;
-        length += 1;
         let [right, left] = AHEAD[direction].map(|(column, row)| is_solid(x + column, y + row));
         // Where two texels touch at a corner only, turning right keeps their polygons apart.
         let next = match (right, left) {
@@ -54,15 +55,27 @@ fn push_polygon(path: &mut String, start: (i32, i32), is_solid: &impl Fn(i32, i3
             (true, false) => continue,
         };
         if (x, y) == start && next == 0 {
-            break;
+            return corners;
         }
-        let letter = if direction % 2 == 0 { 'h' } else { 'v' };
-        let signed = if direction < 2 { length } else { -length };
-        write!(path, "{letter}{signed}").expect("a string takes everything");
+        corners.push((x - half, y - half));
         direction = next;
-        length = 0;
     }
-    path.push('z');
+}
+
+/// The solid texels of `mask` as SVG path data, for either fill rule; empty if there are none.
+pub(super) fn path_data(mask: &Mask) -> String {
+    let mut path = String::new();
+    for polygon in outline(mask, COVERAGE_THRESHOLD) {
+        let [(mut x, mut y), ref others @ ..] = polygon[..] else { continue };
+        write!(path, "M{x} {y}").expect("a string takes everything");
+        for &(next_x, next_y) in others {
+            let (letter, length) = if next_y == y { ('h', next_x - x) } else { ('v', next_y - y) };
+            write!(path, "{letter}{length}").expect("a string takes everything");
+            (x, y) = (next_x, next_y);
+        }
+        path.push('z');
+    }
+    path
 }
 
 #[cfg(test)]
@@ -79,12 +92,12 @@ mod tests {
 
     #[test]
     fn squares_holes_and_texels_that_touch_at_a_corner_are_outlined() {
-        assert_eq!(outline(&Mask::square()), "M-128 -128h256v256h-256z");
-        assert_eq!(outline(&mask_of(|_, _| false)), "");
+        assert_eq!(path_data(&Mask::square()), "M-128 -128h256v256h-256z");
+        assert_eq!(path_data(&mask_of(|_, _| false)), "");
         let ring = mask_of(|x, y| (0..3).contains(&x) && (0..3).contains(&y) && (x, y) != (1, 1));
-        assert_eq!(outline(&ring), "M-128 -128h3v3h-3zM-127 -126h1v-1h-1z");
+        assert_eq!(path_data(&ring), "M-128 -128h3v3h-3zM-127 -126h1v-1h-1z");
         let diagonal = mask_of(|x, y| x < 2 && y < 2 && x == y);
-        assert_eq!(outline(&diagonal), "M-128 -128h1v1h-1zM-127 -127h1v1h-1z");
+        assert_eq!(path_data(&diagonal), "M-128 -128h1v1h-1zM-127 -127h1v1h-1z");
     }
 
     /// The texels that a path covers by the even-odd rule: those with an odd number of vertical sides to their left.
@@ -123,11 +136,11 @@ mod tests {
                     state >> 60 < density
                 })
                 .collect();
-            assert_eq!(filled(&outline(&mask_of(|x, y| texels[(y * SIDE + x) as usize]))), texels);
+            assert_eq!(filled(&path_data(&mask_of(|x, y| texels[(y * SIDE + x) as usize]))), texels);
         }
         let disc: Vec<bool> =
             (0..SIDE * SIDE).map(|i| (i % SIDE - 90).pow(2) + (i / SIDE - 128).pow(2) < 12_000).collect();
-        let path = outline(&mask_of(|x, y| disc[(y * SIDE + x) as usize]));
+        let path = path_data(&mask_of(|x, y| disc[(y * SIDE + x) as usize]));
         assert_eq!(filled(&path), disc);
         assert!(path.len() < 4_000, "{} bytes", path.len());
     }

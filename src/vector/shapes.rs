@@ -4,7 +4,7 @@
 //! An opaque mask is the outline of its solid texels, and a translucent one is a picture whose alpha is the coverage.
 //! Shade is drawn as black over the colour: c * shade / 255 is c under black with the opacity 255 - shade.
 
-use super::outline::outline;
+use super::outline::path_data;
 use super::{base64, push};
 use crate::error::Result;
 use crate::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE, Texel};
@@ -55,7 +55,7 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, population: &Pop
     };
     match blend {
         Blend::Opaque if population.grout.is_some() => {
-            let outline = outline(mask);
+            let outline = path_data(mask);
             push(
                 svg,
                 format_args!("<path id=\"o{layer}\" fill-rule=\"evenodd\" clip-rule=\"evenodd\" d=\"{outline}\"/>\n"),
@@ -63,11 +63,11 @@ fn push_definition(svg: &mut String, layer: usize, mask: &Mask, population: &Pop
             push_cut_out(svg, layer, &format!("<use xlink:href=\"#o{layer}\"/>"), &shade);
         }
         Blend::Opaque if !is_shaded => {
-            let outline = outline(mask);
+            let outline = path_data(mask);
             push(svg, format_args!("<path id=\"m{layer}\" fill-rule=\"evenodd\" d=\"{outline}\"/>\n"));
         }
         Blend::Opaque => {
-            let outline = outline(mask);
+            let outline = path_data(mask);
             push_cut_out(svg, layer, &format!("<path clip-rule=\"evenodd\" d=\"{outline}\"/>"), &shade);
         }
         Blend::Translucent => {

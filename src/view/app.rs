@@ -13,7 +13,7 @@ use winit::event::{StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::window::{Window, WindowId};
 
-use super::dialogs::{self, Answer, Purpose};
+use super::dialogs::{self, Answer};
 use super::interface::{Drawn, Interface, Request, looks};
 use super::news::{Desk, News, Note, Order, Standing};
 use super::remembered::Remembered;
@@ -36,7 +36,7 @@ const REST: Duration = Duration::from_secs(60);
 pub(super) enum Wake {
     News,
     Access(accesskit_winit::Event),
-    Answered(Purpose, Answer),
+    Answered(Request, Answer),
 }
 
 impl From<accesskit_winit::Event> for Wake {
@@ -54,7 +54,9 @@ pub(super) fn run(options: Options) -> Result<Figures> {
     let waker = proxy.clone();
     // The loop may be gone already; then nobody is to be woken.
     let desk = Arc::new(Desk::new(move || drop(waker.send_event(Wake::News))));
-    let Options { path, device, validation, snapshots, redraw } = options;
+    let Options { path, device, validation, snapshots, redraw, end_process } = options;
+    let at_loss = Arc::clone(&desk);
+    vk::when_display_is_gone(move || end_process(&rescue::after(Error::DisplayLost, &at_loss.peek())));
     let tools = Tools { snapshots, redraw };
     let for_worker = Arc::clone(&desk);
     let worker = threads::spawn("search", move || match device() {
@@ -108,6 +110,8 @@ struct Shown {
     retired: Vec<egui::TextureId>,
     /// What the image shows.
     drawn: Option<(Arc<Population>, LiveView)>,
+    /// The title that was set last; the window itself need not know it.
+    title: String,
     /// Whether Ctrl is held, or Command.
     is_command: bool,
     /// Frames in which the mosaic was drawn.
@@ -161,6 +165,7 @@ impl App {
             image: None,
             retired: Vec::new(),
             drawn: None,
+            title: String::new(),
             is_command: false,
             drawn_frames: 0,
             next: None,
@@ -210,12 +215,13 @@ impl App {
         Ok(())
     }
 
-    fn show_title(&self) {
-        if let Some(shown) = &self.shown {
+    fn show_title(&mut self) {
+        if let Some(shown) = &mut self.shown {
             let name = self.interface.news.picture.as_ref().map(|picture| picture.name.as_str());
             let title = name.map_or_else(|| "smalti".to_owned(), |name| format!("{name} - smalti"));
-            if shown.window.title() != title {
+            if shown.title != title {
                 shown.window.set_title(&title);
+                shown.title = title;
             }
         }
     }
@@ -223,30 +229,21 @@ impl App {
     /// Does what the interface asked of the desktop.
     fn follow_requests(&mut self) {
         for request in self.interface.take_requests() {
-            let purpose = match request {
-                Request::ChooseOpen => Purpose::Open,
-                Request::ChooseSave(path) => Purpose::Save(path),
-            };
             let proxy = self.proxy.clone();
-            let tell = move |purpose, answer| drop(proxy.send_event(Wake::Answered(purpose, answer)));
-            if dialogs::show(purpose.clone(), self.remembered.folder.as_deref(), tell).is_err() {
-                self.take_answer(purpose, Answer::Missing);
+            let tell = move |request, answer| drop(proxy.send_event(Wake::Answered(request, answer)));
+            if dialogs::show(request.clone(), self.remembered.folder.as_deref(), tell).is_err() {
+                self.take_answer(&request, Answer::Missing);
             }
         }
     }
 
-    fn take_answer(&mut self, purpose: Purpose, answer: Answer) {
-        match (purpose, answer) {
-            (_, Answer::Cancelled) => {}
-            (Purpose::Open, Answer::Missing) => self.interface.without_dialogs(true),
-            (Purpose::Save(_), Answer::Missing) => self.interface.without_dialogs(false),
-            (Purpose::Open, Answer::Chosen(path)) => {
+    fn take_answer(&mut self, request: &Request, answer: Answer) {
+        match answer {
+            Answer::Cancelled => {}
+            Answer::Missing => self.interface.without_dialogs(request),
+            Answer::Chosen(path) => {
                 self.remember_folder(&path);
-                self.interface.open(path);
-            }
-            (Purpose::Save(_), Answer::Chosen(path)) => {
-                self.remember_folder(&path);
-                self.interface.choose_save(&path);
+                self.interface.choose(request, path);
             }
         }
     }
@@ -300,10 +297,7 @@ impl App {
             let Standing { evals, evals_per_s, .. } = news.standing;
             return Ok(Figures { evals, evals_per_s, ..figures });
         };
-        Err(match rescue::rescue(&news) {
-            Ok(Some(path)) => Error::Rescued { error: Box::new(error), path },
-            Ok(None) | Err(_) => error,
-        })
+        Err(rescue::after(error, &news))
     }
 }
 
@@ -372,7 +366,7 @@ impl ApplicationHandler<Wake> for App {
     fn user_event(&mut self, _: &ActiveEventLoop, wake: Wake) {
         match wake {
             Wake::News => {}
-            Wake::Answered(purpose, answer) => self.take_answer(purpose, answer),
+            Wake::Answered(request, answer) => self.take_answer(&request, answer),
             Wake::Access(event) => {
                 let Some(shown) = &mut self.shown else { return };
                 match event.window_event {

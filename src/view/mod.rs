@@ -28,7 +28,7 @@ mod written;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::studio::Device;
 use crate::vk::Validation;
 
@@ -47,6 +47,8 @@ pub(crate) struct Options {
     pub snapshots: Snapshots,
     /// Draws saved tiles into a file.
     pub redraw: Redraw,
+    /// Tells a failure and ends the process, where the system leaves no other way.
+    pub end_process: fn(&Error) -> !,
 }
 
 /// How the window went.

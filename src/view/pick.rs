@@ -3,17 +3,15 @@
 use egui::{Pos2, pos2};
 
 use crate::model::fly::UNITS_PER_PX;
-use crate::model::mask::COVERAGE_THRESHOLD;
+use crate::model::mask::{COVERAGE_THRESHOLD, MASK_SIDE};
 use crate::model::tile::Tile;
 use crate::model::{Blend, Canvas, Fly, Mask, Population};
+use crate::vector::outline;
 
 /// The number of the nearest fly that covers pixel `(i, j)` of a canvas; of translucent ones, the nearest with any
 /// opacity there.
 pub(super) fn fly_at(tiles: &Population, canvas: &Canvas, (i, j): (i32, i32)) -> Option<usize> {
-    let covered_from = match tiles.masks.blend() {
-        Blend::Opaque => COVERAGE_THRESHOLD,
-        Blend::Translucent => 1,
-    };
+    let covered_from = covered_from(tiles);
     let near = tiles.flies.iter().enumerate().filter(|(_, fly)| may_cover(fly, canvas, (i, j)));
     let covers = |fly: &Fly| {
         let tile = Tile::bake(fly, canvas);
@@ -47,20 +45,35 @@ fn may_cover(fly: &Fly, canvas: &Canvas, (i, j): (i32, i32)) -> bool {
     dx * dx + dy * dy <= (w * w + h * h) / 4.0 + (w + h) * 2.0 + 9.0
 }
 
-/// The corners of a fly's rectangle as places of the picture, where the centre of pixel (0, 0) lies at (0.5, 0.5).
-pub(super) fn corners(fly: &Fly) -> [Pos2; 4] {
+/// The outlines of a tile's mask as places of the picture, where the centre of pixel (0, 0) lies at (0.5, 0.5).
+pub(super) fn footprint(tiles: &Population, fly: &Fly) -> Vec<Vec<Pos2>> {
     let genes = fly.genes();
     let (sin, cos) = genes.angle_deg.to_radians().sin_cos();
-    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(u, v): (f32, f32)| {
-        let (u, v) = (u * genes.w / 2.0, v * genes.h / 2.0);
+    let texels = MASK_SIDE as f32;
+    let place = |(u, v): (i32, i32)| {
+        let (u, v) = (u as f32 / texels * genes.w, v as f32 / texels * genes.h);
         pos2(genes.x + 0.5 + u * cos - v * sin, genes.y + 0.5 + u * sin + v * cos)
-    })
+    };
+    let mask = tiles.masks.layers().get(usize::from(fly.mask)).filter(|_| fly.mask != 0);
+    let half = MASK_SIDE as i32 / 2;
+    let square = || vec![vec![(-half, -half), (half, -half), (half, half), (-half, half)]];
+    let polygons = mask.map_or_else(square, |mask| outline(mask, covered_from(tiles)));
+    polygons.into_iter().map(|polygon| polygon.into_iter().map(place).collect()).collect()
+}
+
+/// Least coverage of what belongs to a tile.
+fn covered_from(tiles: &Population) -> u8 {
+    match tiles.masks.blend() {
+        Blend::Opaque => COVERAGE_THRESHOLD,
+        Blend::Translucent => 1,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::cpu::CpuPainter;
+    use crate::model::mask::Texel;
     use crate::model::{MaskSet, Painter};
 
     #[test]
@@ -93,11 +106,28 @@ mod tests {
     }
 
     #[test]
-    fn corners_turn_from_x_towards_y() {
+    fn a_footprint_turns_from_x_towards_y_and_is_that_of_the_mask() {
         let fly = Fly { x: 640, y: 640, w: 256, h: 128, angle: 16_384, alive: true, ..Fly::ABSENT };
-        let found = corners(&fly).map(|corner| (corner.x.round() as i32, corner.y.round() as i32));
+        let with = |masks| Population {
+            width_px: 20,
+            height_px: 20,
+            background: [0; 3].into(),
+            grout: None,
+            masks,
+            flies: vec![fly],
+        };
         // A quarter turn: the width of 4 px lies along y, the height of 2 px along x.
-        let exact = corners(&fly);
-        assert!((exact[0] - pos2(11.5, 8.5)).length() < 1e-3, "{found:?} {exact:?}");
+        let square = footprint(&with(MaskSet::default()), &fly);
+        assert_eq!(square.iter().map(Vec::len).collect::<Vec<_>>(), [4]);
+        assert!((square[0][0] - pos2(11.5, 8.5)).length() < 1e-3, "{square:?}");
+
+        let right_half =
+            |index: usize| Texel { coverage: if index % MASK_SIDE < MASK_SIDE / 2 { 0 } else { 255 }, shade: 255 };
+        let mask = Mask::new((0..MASK_SIDE * MASK_SIDE).map(right_half).collect()).expect("whole");
+        let masks = MaskSet::with_layers(vec![mask]).expect("a set");
+        let half = footprint(&with(masks), &Fly { mask: 1, ..fly });
+        // The right half of the tile is the lower one after the turn.
+        assert!((half[0][0] - pos2(11.5, 10.5)).length() < 1e-3, "{half:?}");
+        assert!(half.iter().flatten().all(|place| (10.5..=12.5).contains(&place.y)), "{half:?}");
     }
 }

@@ -5,8 +5,16 @@ use std::path::{Path, PathBuf};
 use super::news::News;
 use super::remembered;
 use crate::archive;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::output;
+
+/// The failure that ends the window, which tells where the tiles were saved if there were any.
+pub(super) fn after(error: Error, news: &News) -> Error {
+    match rescue(news) {
+        Ok(Some(path)) => Error::Rescued { error: Box::new(error), path },
+        Ok(None) | Err(_) => error,
+    }
+}
 
 /// Writes the last tiles beside the picture, or where that cannot be, into the folder of the user's configuration; the
 /// file, if there were tiles.

@@ -60,7 +60,7 @@ pub use pipeline::{ComputePipeline, ComputeShader, DepthTest, GraphicsPipeline, 
 pub use pipeline_layout::{BindingKind, PipelineLayout};
 pub use recorder::Recorder;
 #[cfg(feature = "view")]
-pub use screen::{Painted, Screen};
+pub use screen::{Painted, Screen, when_display_is_gone};
 pub use timer::{PassTime, Timing};
 pub use transfer::ReadTicket;
 

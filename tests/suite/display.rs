@@ -79,6 +79,33 @@ impl Display {
         assert!(status.success(), "xdotool {words}");
     }
 
+    /// Puts a picture into the clipboard, as a program that copied it does.
+    pub fn copy_png(&self, picture: &Path) {
+        let words = ["-selection", "clipboard", "-target", "image/png", "-in"];
+        let mut xclip = Command::new("xclip");
+        xclip.args(words).arg(picture).env("DISPLAY", &self.name);
+        // It stays to hand the picture out, and must not hold what the tests print into.
+        let status = xclip.stdout(Stdio::null()).stderr(Stdio::null()).status();
+        let status = status.unwrap_or_else(|error| missing("xclip", "xclip", &error));
+        assert!(status.success(), "xclip takes {}", picture.display());
+        let offered = || {
+            let mut asking = Command::new("xclip");
+            asking.args(["-selection", "clipboard", "-target", "TARGETS", "-out"]).env("DISPLAY", &self.name);
+            let told = asking.output().expect("xclip runs");
+            String::from_utf8_lossy(&told.stdout).into_owned()
+        };
+        let began = Instant::now();
+        while !offered().contains("image/png") {
+            assert!(began.elapsed() < PATIENCE, "the clipboard never holds a picture");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Ends the display under its windows.
+    pub fn lose(&mut self) {
+        self.server.kill().expect("it runs");
+    }
+
     /// Looks at the display until it is as it should be.
     pub fn until(
         &self,

@@ -104,7 +104,7 @@ fn search_rules() -> Twin {
 
 fn twins() -> Vec<Twin> {
     vec![
-        twin!(Tile = "Tile" in Array of ["compose.comp", "evaluate.comp", "mosaic.frag", "re_render.comp", "translucent.comp"], {
+        twin!(Tile = "Tile" in Array of ["compose.comp", "evaluate.comp", "mosaic.vert", "re_render.comp", "translucent.comp"], {
             x0 = "x0", y0 = "y0", x1 = "x1", y1 = "y1", u0 = "u0", v0 = "v0", cos = "cos_step", sin = "sin_step",
             w = "w", h = "h", color = "color", mask = "mask", w_inverse = "w_inverse", h_inverse = "h_inverse",
             ring = "ring"

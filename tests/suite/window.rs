@@ -123,6 +123,11 @@ impl Viewer {
     /// Closes the window as its button does; the exit code and what was said.
     fn close(&mut self) -> (Option<i32>, String) {
         self.display.act(&format!("windowfocus {} sleep 0.3 key alt+F4", self.window));
+        self.end()
+    }
+
+    /// The exit code and what was said, once the program has ended.
+    fn end(&mut self) -> (Option<i32>, String) {
         let began = Instant::now();
         while self.process.try_wait().expect("it can be asked").is_none() {
             assert!(began.elapsed() < Duration::from_secs(60), "the window does not close");
@@ -209,6 +214,25 @@ fn a_picture_is_opened_steered_looked_at_painted_on_saved_and_made_again() {
     let remembered: serde_json::Value =
         serde_json::from_slice(&viewer.workshop.read("configuration/smalti/window.json")).expect("it is JSON");
     assert_eq!(remembered["size"], serde_json::json!([1_180.0, 780.0]), "the window opens so again");
+}
+
+#[test]
+fn a_pasted_picture_is_evolved_and_its_tiles_are_saved_if_the_display_goes() {
+    let mut viewer = Viewer::open("woman.jpg", "--device cpu");
+    viewer.display.copy_png(Path::new("tests/photos/parrots.png"));
+    viewer.key("ctrl+v");
+    let process = &mut viewer.process;
+    viewer.display.window("pasted picture - smalti", || process.try_wait().expect("it can be asked").is_none());
+    viewer.key("p");
+    let photo = viewer.stage("the photo", |stage| colors(stage) > 60);
+    viewer.key("t");
+    viewer.stage("its mosaic", |stage| difference(stage, &photo) > 0.02);
+    viewer.display.lose();
+    let (code, told) = viewer.end();
+    assert_eq!(code, Some(4), "{told}");
+    assert_eq!(told, "smalti: the display of the window is gone; the tiles were saved as mosaic-rescued.npz\n");
+    let drawn = viewer.workshop.run("render mosaic-rescued.npz -o drawn.png");
+    assert_eq!(drawn.code, Some(0), "{}", drawn.stderr);
 }
 
 #[test]

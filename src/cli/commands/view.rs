@@ -61,6 +61,7 @@ fn open(args: &ViewArgs, redraw: Redraw) -> Result<()> {
         validation: if args.validate { Validation::On } else { Validation::Off },
         snapshots: listed,
         redraw,
+        end_process: terminal::end_process,
     })?;
     if args.verbose {
         let Figures { frames, first_tiles, evals, evals_per_s } = figures;

@@ -52,7 +52,7 @@ pub(crate) fn exit_code(error: &Error) -> u8 {
         | Error::Input { .. }
         | Error::Encoding { .. }
         | Error::TooLarge { .. } => 2,
-        Error::NoSuitableDevice { .. } => 4,
+        Error::NoSuitableDevice { .. } | Error::DisplayLost => 4,
         Error::Rescued { error, .. } => exit_code(error),
         Error::DeviceLost { .. } | Error::Interrupted => 75,
         Error::Output { .. }

@@ -89,6 +89,14 @@ pub(crate) fn exit_code(done: Result<()>) -> ExitCode {
     }
 }
 
+/// Prints a failure and ends the process, from wherever it is.
+#[cfg(feature = "view")]
+pub(crate) fn end_process(failure: &Error) -> ! {
+    error(&advice::sentence(failure));
+    // Nothing is tidied up, since other threads are at work.
+    signal_hook::low_level::exit(advice::exit_code(failure).into())
+}
+
 /// Prints a failure.
 pub(crate) fn error(sentence: &str) {
     say(&format!("smalti: {sentence}"));

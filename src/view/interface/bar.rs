@@ -87,7 +87,7 @@ impl Interface {
 
     fn begin_open(&mut self) {
         if self.has_dialogs {
-            self.requests.push(Request::ChooseOpen);
+            self.requests.push(Request::Open);
         } else {
             self.wants_open_field = true;
         }

@@ -6,6 +6,7 @@ use egui::{Color32, ColorImage, CursorIcon, Painter, Pos2, Rect, Response, Slide
 use egui::{TextureOptions, Ui, pos2};
 
 use super::Interface;
+use super::files::{Field, Taken};
 use crate::error::Error;
 use crate::photo::{self, Photo};
 use crate::view::camera::Framed;
@@ -94,7 +95,7 @@ impl Interface {
         let now = ui.input(|input| input.time);
         let size = self.news.picture.as_ref().map(|picture| picture.size);
         let hint = "A grey picture: white is what matters most";
-        if let (Some(path), Some(size)) = (self.fields.load_map.show(ui, "load map", hint), size) {
+        if let (Some(Taken { path, .. }), Some(size)) = (self.show_path(ui, Field::LoadMap, hint), size) {
             match read_map(&path, size) {
                 Ok(map) => {
                     self.brush.forget();
@@ -104,10 +105,10 @@ impl Interface {
             }
         }
         let hint = "Write the map as a PNG, for --weight";
-        if let Some(path) = self.fields.save_map.show(ui, "save map", hint) {
-            let note = match self.wishes.weight.as_deref().map(|map| write_map(&path, map)) {
+        if let Some(taken) = self.show_path(ui, Field::SaveMap, hint) {
+            let note = match self.wishes.weight.as_deref().map(|map| write_map(&taken, map)) {
                 None => Note::failure("there is no map yet: paint one first"),
-                Some(Ok(())) => Note::done(format!("Wrote {}", path.display())),
+                Some(Ok(())) => Note::done(format!("Wrote {}", taken.path.display())),
                 Some(Err(error)) => Note::failure(error.to_string()),
             };
             self.say(note, now);
@@ -168,12 +169,12 @@ fn read_map(path: &std::path::Path, size: [u32; 2]) -> Result<WeightMap, String>
     luma.map(|luma| WeightMap { size, luma }).map_err(|reason| format!("{}: {reason}", path.display()))
 }
 
-fn write_map(path: &std::path::Path, map: &WeightMap) -> crate::error::Result<()> {
+fn write_map(Taken { path, by_dialog }: &Taken, map: &WeightMap) -> crate::error::Result<()> {
     let refuse = |reason: &str| Err(Error::Output { path: path.to_owned(), reason: reason.to_owned() });
     if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
         return refuse("is no PNG by its name; end it with .png");
     }
-    if path.exists() {
+    if path.exists() && !by_dialog {
         return refuse("is there already; choose another name");
     }
     crate::output::write_atomically(path, &encoded(map)?)
@@ -208,12 +209,15 @@ mod tests {
     #[test]
     fn a_map_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("map.png");
+        let typed = |name| Taken { path: folder.path().join(name), by_dialog: false };
+        let taken = typed("map.png");
         let map = WeightMap { size: [7, 3], luma: (0..21).map(|place| place * 12).collect() };
-        write_map(&path, &map).expect("it is written");
-        assert!(write_map(&path, &map).is_err_and(|error| error.to_string().contains("is there already")));
-        assert!(write_map(&folder.path().join("map.jpg"), &map).is_err(), "it would be a PNG");
-        assert_eq!(read_map(&path, [7, 3]), Ok(map));
-        assert!(read_map(&path, [3, 7]).is_err_and(|error| error.contains("proportions")));
+        write_map(&taken, &map).expect("it is written");
+        assert!(write_map(&taken, &map).is_err_and(|error| error.to_string().contains("is there already")));
+        let asked = Taken { by_dialog: true, ..typed("map.png") };
+        write_map(&asked, &map).expect("the dialog has asked whether to replace it");
+        assert!(write_map(&typed("map.jpg"), &map).is_err(), "it would be a PNG");
+        assert_eq!(read_map(&taken.path, [7, 3]), Ok(map));
+        assert!(read_map(&taken.path, [3, 7]).is_err_and(|error| error.contains("proportions")));
     }
 }

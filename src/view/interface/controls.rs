@@ -4,6 +4,7 @@ use egui::{Checkbox, CollapsingHeader, ComboBox, DragValue, Response, RichText, 
 
 use super::Interface;
 use super::course::grouped;
+use super::files::{Field, Taken};
 use crate::evolve::cells::EVALS_PER_FLY;
 use crate::model::Rgb;
 use crate::model::population::FLY_COUNT_MAX;
@@ -111,7 +112,7 @@ impl Interface {
             show_swatches(ui, colors);
         }
         let hint = "A palette of GIMP (.gpl), .pal, .hex, or a picture of at most 256 colours";
-        if let Some(path) = self.fields.palette.show(ui, "palette file", hint) {
+        if let Some(Taken { path, .. }) = self.show_path(ui, Field::Palette, hint) {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             match photo::read_palette(&path) {
                 Ok(colors) => self.wishes.colors = ColorWish::Palette { name, colors: colors.into() },

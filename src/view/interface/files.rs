@@ -4,33 +4,65 @@ use std::path::{Path, PathBuf};
 
 use egui::{Key, TextEdit, Ui};
 
-use super::Interface;
+use super::{Interface, Request};
+
+/// A file that a control reads or writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::view) enum Field {
+    Palette,
+    Mask,
+    LoadMap,
+    SaveMap,
+}
+
+impl Field {
+    const COUNT: usize = 4;
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Palette => "palette file",
+            Self::Mask => "own shape",
+            Self::LoadMap => "load map",
+            Self::SaveMap => "save map",
+        }
+    }
+}
 
 /// A path that is typed, and taken with Enter or its button.
 #[derive(Default)]
-pub(super) struct PathField {
+struct PathField {
     text: String,
     is_open: bool,
+    /// What a dialog of the desktop gave.
+    chosen: Option<PathBuf>,
 }
 
-/// All fields for paths.
+/// All fields for paths, by [`Field`].
 #[derive(Default)]
-pub(super) struct Fields {
-    pub palette: PathField,
-    pub mask: PathField,
-    pub load_map: PathField,
-    pub save_map: PathField,
+pub(super) struct Fields([PathField; Field::COUNT]);
+
+/// A path that was typed or chosen.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Taken {
+    pub path: PathBuf,
+    /// Whether a dialog of the desktop gave it, which asks before a file is replaced.
+    pub by_dialog: bool,
+}
+
+impl Fields {
+    /// Opens a field for typing.
+    pub(super) fn open(&mut self, field: Field) {
+        self.0[field as usize].is_open = true;
+    }
+
+    /// Takes a path that a dialog gave.
+    pub(super) fn choose(&mut self, field: Field, path: PathBuf) {
+        self.0[field as usize].chosen = Some(path);
+    }
 }
 
 impl PathField {
-    /// A button that opens the field, and the field; the path, once it is taken.
-    pub(super) fn show(&mut self, ui: &mut Ui, name: &str, hint: &str) -> Option<PathBuf> {
-        if !self.is_open {
-            if ui.button(format!("{}…", super::controls::title(name))).on_hover_text(hint).clicked() {
-                self.is_open = true;
-            }
-            return None;
-        }
+    fn show(&mut self, ui: &mut Ui, name: &str, hint: &str) -> Option<PathBuf> {
         let mut taken = None;
         ui.horizontal(|ui| {
             let edit =
@@ -45,9 +77,7 @@ impl PathField {
                 self.is_open = false;
             }
         });
-        if taken.is_some() {
-            self.is_open = false;
-        }
+        self.is_open &= taken.is_none();
         taken
     }
 }
@@ -63,6 +93,23 @@ pub(super) fn typed(text: &str) -> PathBuf {
 }
 
 impl Interface {
+    /// A button that opens a dialog of the desktop or, where there is none, a field; the path, once there is one.
+    pub(super) fn show_path(&mut self, ui: &mut Ui, field: Field, hint: &str) -> Option<Taken> {
+        let (name, path) = (field.name(), &mut self.fields.0[field as usize]);
+        let chosen = path.chosen.take().map(|path| Taken { path, by_dialog: true });
+        if path.is_open {
+            return path.show(ui, name, hint).map(|path| Taken { path, by_dialog: false }).or(chosen);
+        }
+        if ui.button(format!("{}…", super::controls::title(name))).on_hover_text(hint).clicked() {
+            if self.has_dialogs {
+                self.requests.push(Request::Field(field));
+            } else {
+                path.is_open = true;
+            }
+        }
+        chosen
+    }
+
     /// The field for what is to be opened.
     pub(super) fn show_open_field(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use egui::{Color32, ColorImage, Sense, Stroke, StrokeKind, TextureHandle, TextureOptions, Ui, Vec2};
 
+use super::files::{Field, Taken};
 use super::{Interface, looks};
 use crate::model::mask::MASK_SIDE;
 use crate::shapes::{BuiltIn, Shader, Template};
@@ -93,7 +94,7 @@ impl Interface {
             ui.weak("None chosen: as the style has it. Several make a mix.");
         }
         let hint = "A picture or an SVG of a tile: what is opaque in it is the tile";
-        if let Some(path) = self.fields.mask.show(ui, "own shape", hint) {
+        if let Some(Taken { path, .. }) = self.show_path(ui, Field::Mask, hint) {
             match read_mask(&path) {
                 Ok(mask) => self.wishes.masks.push(mask),
                 Err(error) => self.say(Note::failure(error), ui.input(|input| input.time)),

@@ -12,13 +12,14 @@ mod messages;
 mod saving;
 mod stage;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{Rect, TextureHandle, TextureId, Ui};
 
 use self::brush::Brush;
 pub(super) use self::brush::encoded as encoded_map;
+pub(super) use self::files::Field;
 use self::files::Fields;
 use self::masks::Thumbnails;
 use self::messages::Messages;
@@ -41,10 +42,12 @@ pub(super) struct Drawn {
 /// What the desktop is asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Request {
-    /// Choose a file to open by a dialog of the desktop.
-    ChooseOpen,
-    /// Choose where to save by a dialog of the desktop.
-    ChooseSave(PathBuf),
+    /// Choose what to open by a dialog of the desktop.
+    Open,
+    /// Choose where to save by such a dialog.
+    Save(PathBuf),
+    /// Choose the file of a field by such a dialog.
+    Field(Field),
 }
 
 /// Everything that the window holds of its own.
@@ -196,14 +199,23 @@ impl Interface {
     }
 
     /// Learns that the desktop has no dialog, so that fields for paths serve.
-    pub(super) fn without_dialogs(&mut self, was_to_open: bool) {
+    pub(super) fn without_dialogs(&mut self, request: &Request) {
         self.has_dialogs = false;
-        self.wants_open_field |= was_to_open;
+        match request {
+            Request::Open => self.wants_open_field = true,
+            // Its form has a field.
+            Request::Save(_) => {}
+            Request::Field(field) => self.fields.open(*field),
+        }
     }
 
-    /// Takes a path that was chosen for saving.
-    pub(super) fn choose_save(&mut self, path: &Path) {
-        self.save.choose(path);
+    /// Takes a path that a dialog gave.
+    pub(super) fn choose(&mut self, request: &Request, path: PathBuf) {
+        match request {
+            Request::Open => self.open(path),
+            Request::Save(_) => self.save.choose(&path),
+            Request::Field(field) => self.fields.choose(*field, path),
+        }
     }
 
     /// Whether the window may be closed: at once if nothing would be lost, else when that is asked for again.

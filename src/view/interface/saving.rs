@@ -101,7 +101,7 @@ impl Interface {
                 self.save.replaces = None;
             }
             if self.has_dialogs && ui.button("Browse…").clicked() {
-                self.requests.push(Request::ChooseSave(typed(&self.save.path)));
+                self.requests.push(Request::Save(typed(&self.save.path)));
             }
         });
     }

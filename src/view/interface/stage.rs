@@ -200,10 +200,11 @@ impl Interface {
         let Some(number) = pick::fly_at(&tiles, &view.canvas, pixel) else { return };
         self.hovered = Some(number);
         let Some(fly) = tiles.flies.get(number) else { return };
-        let corners = pick::corners(fly).map(|corner| framed.point_of(corner) / ppp);
+        let on_screen = |polygon: Vec<Pos2>| polygon.into_iter().map(|place| framed.point_of(place) / ppp).collect();
+        let outlines: Vec<Vec<Pos2>> = pick::footprint(&tiles, fly).into_iter().map(on_screen).collect();
         for (color, width) in [(Color32::BLACK, 3.0), (Color32::WHITE, 1.2)] {
-            let outline = egui::Shape::closed_line(corners.to_vec(), Stroke::new(width, color));
-            painter.add(outline);
+            let line = |outline: &Vec<Pos2>| egui::Shape::closed_line(outline.clone(), Stroke::new(width, color));
+            painter.extend(outlines.iter().map(line));
         }
         self.show_genes(ui, painter.clip_rect(), &tiles, number);
     }

@@ -8,7 +8,7 @@ use egui::{Key, Modifiers, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 
-use super::{Compare, Interface, Request};
+use super::{Compare, Field, Interface, Request};
 use crate::evolve::StopReason;
 use crate::model::{Fly, MaskSet, Population};
 use crate::shapes::Shader;
@@ -402,10 +402,20 @@ fn dialogs_of_the_desktop_are_asked_for_where_there_are_any() {
     let mut window = window();
     window.state_mut().has_dialogs = true;
     click(&mut window, "Open…");
-    assert_eq!(window.state_mut().take_requests(), [Request::ChooseOpen]);
-    window.state_mut().without_dialogs(true);
+    assert_eq!(window.state_mut().take_requests(), [Request::Open]);
+    window.state_mut().without_dialogs(&Request::Open);
     window.run();
     window.get_by_label("path to open");
+
+    window.state_mut().has_dialogs = true;
+    click(&mut window, "Own shape…");
+    assert_eq!(window.state_mut().take_requests(), [Request::Field(Field::Mask)]);
+    window.state_mut().choose(&Request::Field(Field::Mask), "there/is/none.svg".into());
+    window.run();
+    assert!(window.state().messages.texts().iter().any(|text| text.contains("none.svg")), "the path is taken");
+    window.state_mut().without_dialogs(&Request::Field(Field::Mask));
+    window.run();
+    window.get_by_label("own shape");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! A frame is waited for before the call that painted it returns.
 
 mod colors;
+mod display;
 mod interface;
 mod memory;
 mod surface;
@@ -15,6 +16,7 @@ use ash::{khr, vk};
 use egui::{ClippedPrimitive, TextureId, TexturesDelta};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
+pub use self::display::when_display_is_gone;
 use self::interface::{Interface, LABEL};
 use self::surface::Surface;
 use self::swapchain::{Swapchain, create_semaphore};
