@@ -1,5 +1,7 @@
 //! A finished mosaic: its tiles, its score, its pixels at any size, and its bytes in every format.
 
+use std::path::Path;
+
 use super::device::Device;
 use super::drawing::{Content, Drawn, JPEG_QUALITY, Pieces, Raster, View};
 use super::job::Job;
@@ -13,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::evolve::{Ending, StopReason};
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Backdrop, Population, Rgb};
+use crate::output;
 use crate::photo::{Photo, WEBP_SIDE_MAX_PX};
 
 /// The pixels of a mosaic.
@@ -236,17 +239,25 @@ impl Mosaic {
         self.drawn.population.background == Backdrop::Transparent
     }
 
-    /// As a file of this content.
+    /// Writes a file in the format that its name ends in: `.png`, `.jpg`, `.webp`, `.svg`, `.ora`, `.npz`, `.csv` or
+    /// `.json`. It is there as a whole or not at all, and a file of the same name is replaced.
     ///
     /// # Errors
-    /// As the method of the format.
-    #[cfg(feature = "view")]
-    pub(crate) fn encode_as(&self, content: Content) -> Result<Vec<u8>> {
-        match content {
+    /// [`Error::Output`] if the name has no such ending, or the file cannot be written; else as the method of the
+    /// format.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        let unknown = || Error::Output {
+            path: path.to_owned(),
+            reason: "does not end in .png, .jpg, .webp, .svg, .ora, .npz, .csv or .json; choose one of these"
+                .to_owned(),
+        };
+        let bytes = match Content::of_path(path).ok_or_else(unknown)? {
             Content::WebP => self.webp(),
             Content::OpenRaster => self.ora(),
             content => self.encode(content),
-        }
+        };
+        output::write_atomically(path, &bytes?)
     }
 
     fn encode(&self, content: Content) -> Result<Vec<u8>> {

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::news::SaveOrder;
 use super::opened::Open;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::output;
-use crate::studio::{Content, Device, Mosaic, Script, Session, quoted};
+use crate::studio::{Device, Script, Session, quoted};
 
 /// Draws the tiles of the first file into the second, with a longer side in px or as they evolved.
 pub(crate) type Redraw = fn(&Path, &Path, Option<u32>) -> Result<()>;
@@ -28,7 +28,7 @@ pub(super) fn save(
     if let Some(px) = save.long_side_px {
         mosaic = mosaic.resized(px, device)?;
     }
-    output::write_atomically(&save.path, &encoded(&mosaic, &save.path)?)?;
+    mosaic.save(&save.path)?;
     let mut wrote = save.path.display().to_string();
     let mut input = open.path().map(Path::to_owned);
     if let Some(bytes) = &open.pasted {
@@ -47,15 +47,6 @@ pub(super) fn save(
         wrote += &format!(", {}", super::name_of(&steps));
     }
     Ok(format!("Wrote {wrote}. It is made again by: {}", command(script, is_at_end, input.as_deref(), Some(save))))
-}
-
-/// The bytes of a mosaic in the format that the ending of a path names.
-fn encoded(mosaic: &Mosaic, path: &Path) -> Result<Vec<u8>> {
-    let unknown = || Error::Output {
-        path: path.to_owned(),
-        reason: "does not end in a format; choose one in the form".to_owned(),
-    };
-    mosaic.encode_as(Content::of_path(path).ok_or_else(unknown)?)
 }
 
 /// Whether flags alone ask for the same mosaic: it was not steered, nor ended by hand.

@@ -22,7 +22,7 @@ use crate::studio::{Device, Picture, Script, Session, Step, WrittenRecipe};
 
 /// Time between two pieces of news about the tiles: about ten frames a second. What they cost a search on the same
 /// processors, benches/results/2026-11-window.md tells.
-const BETWEEN_NEWS: Duration = Duration::from_millis(90);
+const BETWEEN_NEWS: Duration = Duration::from_millis(98);
 /// How often a search that rests looks whether the window wants to know more.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(80);
 

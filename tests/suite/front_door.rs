@@ -65,6 +65,8 @@ fn every_file_has_the_bytes_that_the_command_line_writes() {
         ];
         for (ending, made) in files.iter().zip(made) {
             assert!(made.unwrap() == workshop.read(&format!("a.{ending}")), "{line}: {ending}");
+            mosaic.save(workshop.path(&format!("saved.{ending}"))).unwrap();
+            assert!(workshop.read(&format!("saved.{ending}")) == workshop.read(&format!("a.{ending}")), "{ending}");
         }
     }
 }
@@ -332,6 +334,7 @@ fn what_cannot_be_is_refused_by_its_name() {
     assert_eq!(refused(mosaic.jpeg_of_quality(0)).0, "quality");
     assert_eq!(refused(mosaic.resized(0, &device)).0, "output_size");
     assert_eq!(refused(mosaic.resized(65_536, &device)).0, "output_size");
+    assert!(mosaic.save("mosaic.xyz").unwrap_err().to_string().starts_with("mosaic.xyz: does not end in .png"));
     assert_eq!(refused(mosaic.resized(16_384, &device).unwrap().webp()).0, "output_size");
 }
 

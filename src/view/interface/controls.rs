@@ -2,9 +2,9 @@
 
 use egui::{Checkbox, CollapsingHeader, ComboBox, DragValue, Response, RichText, ScrollArea, Slider, Ui};
 
-use super::Interface;
 use super::course::grouped;
 use super::files::{Field, Taken};
+use super::{Interface, looks};
 use crate::evolve::cells::EVALS_PER_FLY;
 use crate::model::Rgb;
 use crate::model::population::FLY_COUNT_MAX;
@@ -46,7 +46,7 @@ impl Interface {
         ui.horizontal_wrapped(|ui| {
             for style in StyleWish::ALL {
                 let is_chosen = self.wishes.style == style;
-                let name = title(style.name());
+                let name = looks::title(style.name());
                 if ui.selectable_label(is_chosen, name).on_hover_text(style.description()).clicked() && !is_chosen {
                     // What belongs to a style does not follow into another.
                     let kept = self.wishes.clone();
@@ -135,12 +135,6 @@ fn count(text: &str) -> Option<f64> {
 /// A section that can be closed.
 fn section(ui: &mut Ui, name: &str, is_open: bool, show: impl FnOnce(&mut Ui)) {
     CollapsingHeader::new(RichText::new(name).strong()).default_open(is_open).show(ui, show);
-}
-
-/// A name as a title.
-pub(super) fn title(name: &str) -> String {
-    let mut letters = name.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
 }
 
 fn show_swatches(ui: &mut Ui, colors: &[Rgb]) {
@@ -294,6 +288,5 @@ mod tests {
         {
             assert_eq!(count(text), number, "{text}");
         }
-        assert_eq!(title("mosaic"), "Mosaic");
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use egui::{Key, TextEdit, Ui};
 
-use super::{Interface, Request};
+use super::{Interface, Request, looks};
 
 /// A file that a control reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,7 +100,7 @@ impl Interface {
         if path.is_open {
             return path.show(ui, name, hint).map(|path| Taken { path, by_dialog: false }).or(chosen);
         }
-        if ui.button(format!("{}…", super::controls::title(name))).on_hover_text(hint).clicked() {
+        if ui.button(format!("{}…", looks::title(name))).on_hover_text(hint).clicked() {
             if self.has_dialogs {
                 self.requests.push(Request::Field(field));
             } else {

@@ -84,6 +84,12 @@ pub(super) fn error_color(error: u16) -> Color32 {
     Color32::from_rgb(mix(0) as u8, mix(1) as u8, mix(2) as u8)
 }
 
+/// A name as a title.
+pub(super) fn title(name: &str) -> String {
+    let mut letters = name.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,5 +102,6 @@ mod tests {
         };
         assert!((0..384).all(|error| luma(error) <= luma(error + 1)));
         assert_eq!(error_color(765), Color32::WHITE);
+        assert_eq!(title("mosaic"), "Mosaic");
     }
 }

@@ -62,11 +62,12 @@ impl Interface {
         let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Image, true, "mosaic"));
         let painter = ui.painter_at(rect);
-        painter.rect_filled(rect, 0.0, looks::stage_color(ui.visuals().dark_mode));
+        let back = looks::stage_color(ui.visuals().dark_mode);
         self.wanted = None;
         self.hovered = None;
         let Some(picture) = self.news.picture.clone() else {
             self.on_stage = None;
+            painter.rect_filled(rect, 0.0, back);
             self.show_invitation(ui, rect);
             return;
         };
@@ -79,11 +80,15 @@ impl Interface {
         let framed = self.camera.frame(size, stage);
         let in_points = |rect: Rect| Rect::from_min_max(rect.min / ppp, rect.max / ppp);
         let whole = in_points(framed.picture);
+        let is_clear = |tiles: &Arc<Population>| tiles.background == Backdrop::Transparent;
+        let is_clear = self.tiles().is_none_or(is_clear);
+        // What lies behind an opaque mosaic is not painted, since software Vulkan would do that for every pixel.
+        let is_alone = drawn.is_some() && !is_clear && self.compare == Compare::Mosaic && !self.peek;
+        let hidden = framed.visible().filter(|_| is_alone).map(|(_, place)| in_points(place));
+        fill_around(&painter, rect, hidden, back);
         if let Some((view, place)) = framed.visible() {
             self.wanted = Some(view);
-            let is_clear = |tiles: &Arc<Population>| tiles.background == Backdrop::Transparent;
-            // Opaque tiles hide it, and software Vulkan would paint every square of it.
-            if self.tiles().is_none_or(is_clear) {
+            if is_clear {
                 show_checkers(&painter, whole.intersect(rect), ui.visuals().dark_mode);
             }
             let mosaic = drawn.filter(|_| self.tiles().is_some()).map(|drawn| {
@@ -311,6 +316,24 @@ impl Interface {
             }
         }
         self.error.as_ref().map(|(_, texture)| texture.id())
+    }
+}
+
+/// Fills a rectangle, but not what of it is hidden.
+fn fill_around(painter: &Painter, rect: Rect, hidden: Option<Rect>, color: Color32) {
+    // Edges are softened over a pixel, which must lie behind what hides them.
+    let hole = hidden.map(|hidden| hidden.intersect(rect).shrink(2.0)).filter(|hole| hole.is_positive());
+    let Some(hole) = hole else {
+        painter.rect_filled(rect, 0.0, color);
+        return;
+    };
+    for side in [
+        Rect::from_min_max(rect.min, pos2(rect.right(), hole.top())),
+        Rect::from_min_max(pos2(rect.left(), hole.bottom()), rect.max),
+        Rect::from_min_max(pos2(rect.left(), hole.top()), hole.left_bottom()),
+        Rect::from_min_max(hole.right_top(), pos2(rect.right(), hole.bottom())),
+    ] {
+        painter.rect_filled(side, 0.0, color);
     }
 }
 
