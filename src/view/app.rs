@@ -22,6 +22,7 @@ use super::worker::{Tools, work};
 use super::{Figures, Options, rescue};
 use crate::error::{Error, NoDevice, Result};
 use crate::gpu::{LiveMosaic, LiveView};
+use crate::guard;
 use crate::model::Population;
 use crate::studio::check_messages;
 use crate::threads;
@@ -73,8 +74,11 @@ pub(super) fn run(options: Options) -> Result<Figures> {
     if let Some(path) = path {
         app.interface.open(path);
     }
-    let ended = events.run_app(&mut app).map_err(|error| no_display(in_words(&error)));
-    app.end(worker, ended)
+    let desk = Arc::clone(&app.desk);
+    match guard::caught(|| events.run_app(&mut app)) {
+        Ok(ended) => app.end(worker, ended.map_err(|error| no_display(in_words(&error)))),
+        Err(panicked) => end_process(&rescue::after(rescue::reason(&panicked), &desk.peek())),
+    }
 }
 
 fn in_words(error: &winit::error::EventLoopError) -> String {

@@ -6,7 +6,16 @@ use super::news::News;
 use super::remembered;
 use crate::archive;
 use crate::error::{Error, Result};
+use crate::guard::Panicked;
 use crate::output;
+
+/// Why the window gave up. Some calls of winit panic where the X server is gone.
+pub(super) fn reason(panicked: &Panicked) -> Error {
+    if panicked.place.contains("/winit-") {
+        return Error::DisplayLost;
+    }
+    Error::Internal(format!("{panicked} ({})", panicked.place))
+}
 
 /// The failure that ends the window, which tells where the tiles were saved if there were any.
 pub(super) fn after(error: Error, news: &News) -> Error {
