@@ -322,7 +322,7 @@ impl Interface {
 /// Fills a rectangle, but not what of it is hidden.
 fn fill_around(painter: &Painter, rect: Rect, hidden: Option<Rect>, color: Color32) {
     // Edges are softened over a pixel, which must lie behind what hides them.
-    let hole = hidden.map(|hidden| hidden.intersect(rect).shrink(2.0)).filter(|hole| hole.is_positive());
+    let hole = hidden.map(|hidden| hidden.intersect(rect).shrink(2.0)).filter(Rect::is_positive);
     let Some(hole) = hole else {
         painter.rect_filled(rect, 0.0, color);
         return;
