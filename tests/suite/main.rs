@@ -39,6 +39,7 @@ mod lanes_vulkan;
 mod layering;
 mod layout;
 mod live;
+mod locks;
 mod looks;
 mod machines;
 #[cfg(unix)]
