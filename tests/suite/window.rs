@@ -219,6 +219,8 @@ fn a_picture_is_opened_steered_looked_at_painted_on_saved_and_made_again() {
 #[test]
 fn a_pasted_picture_is_evolved_and_its_tiles_are_saved_if_the_display_goes() {
     let mut viewer = Viewer::open("woman.jpg", "--device cpu");
+    // A key that is pressed before the window listens is lost.
+    viewer.stage("a mosaic", |stage| colors(stage) > 60);
     viewer.display.copy_png(Path::new("tests/photos/parrots.png"));
     viewer.key("ctrl+v");
     let process = &mut viewer.process;
