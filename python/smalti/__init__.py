@@ -147,8 +147,8 @@ def evolve(
     ``picture`` is a path, an array (height x width, or x 3 or 4; bytes, or real numbers from 0 to 1), or an image of
     Pillow. ``words`` are the flags of ``smalti evolve`` with underscores: ``style``, ``tiles``, ``size``, ``seed``,
     ``evals``, ``mask``, ``shader``, ``grout``, ``grout_width``, ``colors``, ``palette``, ``background``, ``weight`` and
-    so on. ``mask`` is a name, a path, the bytes of a file, or a list of these; ``palette`` a path or a list of
-    (r, g, b); ``weight`` a path or an array of bytes (height x width).
+    so on; an unknown word is refused with a list of the known ones. ``mask`` is a name, a path, the bytes of a file, or
+    a list of these; ``palette`` a path or a list of (r, g, b); ``weight`` a path or an array of bytes (height x width).
 
     ``progress(share, error)`` is called about ten times a second. If it returns False, the mosaic is as it has become
     until then; what it raises ends the work and is raised here.

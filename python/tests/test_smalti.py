@@ -49,7 +49,8 @@ def test_files_have_the_bytes_of_the_command_line(tmp_path, cpu, style, ending):
 @pytest.mark.parametrize("style", ["mosaic", "spray"])
 def test_pixels_give_the_tiles_of_the_file(cpu, pixels, style):
     of_file = smalti.evolve(PHOTOS / "parrots.png", device=cpu, style=style, **WORDS)
-    for picture in [pixels, pixels / 255, numpy.asfortranarray(pixels)]:
+    pillow = pytest.importorskip("PIL.Image").fromarray(pixels)
+    for picture in [pixels, pixels / 255, numpy.asfortranarray(pixels), pillow]:
         of_pixels = smalti.evolve(picture, device=cpu, style=style, **WORDS)
         assert (of_pixels.tiles == of_file.tiles).all()
         assert (of_pixels.image(200) == of_file.image(200)).all()

@@ -20,7 +20,7 @@ use crate::evolve::cells::EVALS_PER_FLY;
 use crate::model::{Canvas, Painter, Population, Rgb};
 use crate::studio::{Device, Picture, Script, Session, Step, WrittenRecipe};
 
-/// Time between two pieces of news about the tiles: about ten frames a second. What they cost a search on the same
+/// Time between two pieces of news about the tiles: ten frames a second at most. What they cost a search on the same
 /// processors, benches/results/2026-11-window.md tells.
 const BETWEEN_NEWS: Duration = Duration::from_millis(98);
 /// How often a search that rests looks whether the window wants to know more.
