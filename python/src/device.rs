@@ -41,10 +41,10 @@ impl Device {
     }
 }
 
-/// The device of calls that name none, opened by the first of them.
-pub(crate) fn usual() -> Result<&'static smalti::Device, smalti::Error> {
+/// The named device; for calls that name none, one that the first of them opens.
+pub(crate) fn or_usual(named: Option<&smalti::Device>) -> Result<&smalti::Device, smalti::Error> {
     static USUAL: OnceLock<smalti::Device> = OnceLock::new();
-    if let Some(device) = USUAL.get() {
+    if let Some(device) = named.or(USUAL.get()) {
         return Ok(device);
     }
     let opened = smalti::Device::auto()?;

@@ -31,19 +31,18 @@ pub(crate) fn evolve(
 ) -> PyResult<Mosaic> {
     let source = Source::of(picture)?;
     let recipe = recipe(words)?;
-    let device = device.map(|device| &device.get().0);
+    let named = device.map(|device| &device.get().0);
     let mut watch = Watch::new(progress);
     let made = py.detach(|| -> Result<smalti::Mosaic, Error> {
         let picture = source.open()?;
-        let device = match device {
-            Some(device) => device,
-            None => device::usual()?,
-        };
-        recipe.make(&picture, device, |standing| watch.goes_on(standing))
+        recipe.make(&picture, device::or_usual(named)?, |standing| watch.goes_on(standing))
     });
     match watch.raised {
         Some(raised) => Err(raised),
-        None => made.map(Mosaic).map_err(|error| exception(&error)),
+        None => {
+            let made = made.map_err(|error| exception(&error))?;
+            Ok(Mosaic(made, device.map(|device| device.clone().unbind())))
+        }
     }
 }
 

@@ -8,12 +8,12 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::device;
+use crate::device::{self, Device};
 use crate::failure::exception;
 
-/// A finished mosaic; `smalti.Mosaic` is around it.
+/// A finished mosaic, and the device that was named to make it; `smalti.Mosaic` is around it.
 #[pyclass(frozen, module = "smalti._smalti")]
-pub(crate) struct Mosaic(pub smalti::Mosaic);
+pub(crate) struct Mosaic(pub smalti::Mosaic, pub Option<Py<Device>>);
 
 #[pymethods]
 impl Mosaic {
@@ -74,8 +74,10 @@ impl Mosaic {
 
     /// The same tiles drawn at another size.
     fn resized(&self, py: Python<'_>, long_side_px: u32) -> PyResult<Self> {
-        let drawn = py.detach(|| self.0.resized(long_side_px, device::usual()?));
-        drawn.map(Self).map_err(|error| exception(&error))
+        let device = self.1.as_ref().map(|device| &device.get().0);
+        let drawn = py.detach(|| self.0.resized(long_side_px, device::or_usual(device)?));
+        let device = self.1.as_ref().map(|device| device.clone_ref(py));
+        drawn.map(|drawn| Self(drawn, device)).map_err(|error| exception(&error))
     }
 
     /// Writes a file, whose ending tells the format.
