@@ -6,7 +6,7 @@
 
 use std::path::PathBuf;
 
-use smalti::{Device, Picture, Recipe, make_all};
+use smalti::{Device, Mosaic, Picture, Recipe, make_all};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Pictures are read as they are needed; one that cannot be read does not stop the others.
     let tasks = paths.iter().map(|path| Ok((Picture::open(path)?, recipe.clone())));
     let mut failed = 0;
-    make_all(&Device::auto()?, tasks, |number, mosaic| {
+    let keep = |number: usize, mosaic: smalti::Result<Mosaic>| {
         let stem = paths[number].file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let write = || -> Result<(), Box<dyn std::error::Error>> {
             Ok(std::fs::write(PathBuf::from(&to).join(stem + ".jpg"), mosaic?.jpeg()?)?)
@@ -30,7 +30,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             eprintln!("picture {number}: {error}");
         }
         true
-    })?;
+    };
+    make_all(&Device::auto()?, tasks, || true, keep)?;
     println!("{} made, {failed} failed", paths.len() - failed);
     Ok(())
 }

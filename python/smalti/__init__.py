@@ -15,15 +15,18 @@ and the same files as ``smalti evolve`` writes.
 
 from __future__ import annotations
 
+import atexit
+import io
 import os
-from collections.abc import Callable
-from typing import Any
+import weakref
+from collections.abc import Callable, Generator, Iterable
+from typing import Any, Literal
 
 import numpy
 
-from ._smalti import Device, Mosaic as _Mosaic, evolve as _evolve
+from ._smalti import Device, Many as _Many, Mosaic as _Mosaic, evolve as _evolve, evolve_many as _evolve_many
 
-__all__ = ["Device", "Mosaic", "evolve"]
+__all__ = ["TILE", "Device", "Mosaic", "evolve", "evolve_many"]
 
 #: What :attr:`Mosaic.tiles` holds of each tile. Lengths and places are in px of the evolved picture, where pixel
 #: (i, j) has its centre at x = i, y = j, and y points down.
@@ -48,7 +51,7 @@ TILE = numpy.dtype(
 class Mosaic:
     """A finished mosaic: its tiles, its score, its pixels at any size, and its files."""
 
-    __slots__ = ("_made",)
+    __slots__ = ("__weakref__", "_made")
 
     def __init__(self, made: _Mosaic) -> None:
         self._made = made
@@ -102,6 +105,12 @@ class Mosaic:
             tiles[name] = columns[name]
         return tiles
 
+    @property
+    def population(self) -> dict[str, numpy.ndarray]:
+        """All flies, also those that have died, and their masks: what a saved .npz holds, by name (docs/reference.md)."""
+        with numpy.load(io.BytesIO(self._made.npz())) as archive:
+            return {name: archive[name] for name in archive.files if not name.endswith(".json")}
+
     def image(self, size: int | None = None) -> numpy.ndarray:
         """The pixels, height x width x 3 (4 with alpha, if nothing lies behind the tiles) as bytes.
 
@@ -146,9 +155,10 @@ def evolve(
 
     ``picture`` is a path, an array (height x width, or x 3 or 4; bytes, or real numbers from 0 to 1), or an image of
     Pillow. ``words`` are the flags of ``smalti evolve`` with underscores: ``style``, ``tiles``, ``size``, ``seed``,
-    ``evals``, ``mask``, ``shader``, ``grout``, ``grout_width``, ``colors``, ``palette``, ``background``, ``weight`` and
-    so on; an unknown word is refused with a list of the known ones. ``mask`` is a name, a path, the bytes of a file, or
-    a list of these; ``palette`` a path or a list of (r, g, b); ``weight`` a path or an array of bytes (height x width).
+    ``evals``, ``mask``, ``shader``, ``grout``, ``grout_width``, ``colors``, ``palette``, ``background``, ``weight``,
+    ``preset`` and so on; an unknown word is refused with a list of the known ones. ``mask`` is a name, a path, the bytes
+    of a file, or a list of these; ``palette`` a path or a list of (r, g, b); ``weight`` a path or an array of bytes
+    (height x width); ``init`` a path or a :class:`Mosaic`.
 
     ``progress(share, error)`` is called about ten times a second. If it returns False, the mosaic is as it has become
     until then; what it raises ends the work and is raised here.
@@ -160,11 +170,88 @@ def evolve(
     Traceback (most recent call last):
     ValueError: tiles 0: must be 1 to 1000000
     """
-    if "weight" in words and not isinstance(words["weight"], (str, os.PathLike)) and words["weight"] is not None:
-        words["weight"] = _bytes_of(numpy.asarray(words["weight"]), "weight")
+    return Mosaic(_evolve(_picture(picture), _checked(words), device, progress))
+
+
+def evolve_many(
+    pictures: Iterable[Any],
+    *,
+    device: Device | None = None,
+    on_error: Literal["raise", "yield"] = "raise",
+    **words: Any,
+) -> Generator[tuple[int, Any], None, None]:
+    """Evolves many pictures at once, on all cores or as lanes of a device.
+
+    Yields pairs of a number, counted from 0 in the order of ``pictures``, and its :class:`Mosaic`, as they end: in any
+    order. Each mosaic is the one that :func:`evolve` makes with the same words. ``pictures`` is read as pictures are
+    needed, by another thread, so it may be a generator that never ends; leave the loop, and the work ends.
+
+    A picture that cannot be used raises its exception, which ends the work. With ``on_error="yield"`` the exception
+    comes in the place of the mosaic, and the others go on.
+
+    >>> import numpy, smalti
+    >>> pictures = [numpy.full((8, 12, 3), grey, numpy.uint8) for grey in (0, 255)]
+    >>> {number: mosaic.size for number, mosaic in smalti.evolve_many(pictures, tiles=4)}
+    {0: (12, 8), 1: (12, 8)}
+    """
+    if on_error not in ("raise", "yield"):
+        raise ValueError(f"on_error: {on_error!r} is neither 'raise' nor 'yield'")
+    if isinstance(pictures, (str, bytes, os.PathLike)):
+        raise ValueError("pictures: is one picture, and must be several; smalti.evolve makes a mosaic of one")
+    many = _evolve_many(_Pictures(pictures), _checked(words), device)
+    taken = _taken(many, on_error == "raise")
+    _at_work.add(many)
+    return taken
+
+
+#: What still works when the interpreter ends must end first, since it reads pictures by it.
+_at_work: weakref.WeakSet[_Many] = weakref.WeakSet()
+
+
+@atexit.register
+def _end_all() -> None:
+    for many in list(_at_work):
+        many.close()
+
+
+def _taken(many: _Many, is_raised: bool) -> Generator[tuple[int, Any], None, None]:
+    try:
+        for number, made in many:
+            if isinstance(made, BaseException) and is_raised:
+                raise made
+            yield number, made if isinstance(made, BaseException) else Mosaic(made)
+    finally:
+        many.close()
+
+
+class _Pictures:
+    """Pictures as the library takes them; what is none is handed on, and refused there by its number."""
+
+    def __init__(self, pictures: Iterable[Any]) -> None:
+        self._pictures = iter(pictures)
+
+    def __iter__(self) -> _Pictures:
+        return self
+
+    def __next__(self) -> Any:
+        picture = next(self._pictures)
+        try:
+            return _picture(picture)
+        except Exception as refusal:
+            return refusal
+
+
+def _checked(words: dict[str, Any]) -> dict[str, Any]:
+    """The words, with maps and mosaics as the library takes them."""
+    words = dict(words)
+    weight = words.get("weight")
+    if weight is not None and not isinstance(weight, (str, os.PathLike)):
+        words["weight"] = _bytes_of(numpy.asarray(weight), "weight")
         if words["weight"].ndim != 2:
             raise ValueError(f"weight: has the shape {words['weight'].shape}, and needs (height, width)")
-    return Mosaic(_evolve(_picture(picture), words, device, progress))
+    if isinstance(words.get("init"), Mosaic):
+        words["init"] = words["init"]._made
+    return words
 
 
 def _picture(picture: Any) -> Any:

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyBaseException, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
-use smalti::{Error, Mask, Recipe, WrittenRecipe};
+use smalti::{Error, Mask, OnDry, Recipe, WrittenRecipe};
 
 use crate::device::{self, Device};
 use crate::failure::exception;
@@ -30,11 +30,11 @@ pub(crate) fn evolve(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Mosaic> {
     let source = Source::of(picture)?;
-    let recipe = recipe(words)?;
+    let Wanted { recipe, is_lenient } = Wanted::of(words)?;
     let named = device.map(|device| &device.get().0);
     let mut watch = Watch::new(progress);
     let made = py.detach(|| -> Result<smalti::Mosaic, Error> {
-        let picture = source.open()?;
+        let picture = source.open(is_lenient)?;
         recipe.make(&picture, device::or_usual(named)?, |standing| watch.goes_on(standing))
     });
     match watch.raised {
@@ -47,21 +47,26 @@ pub(crate) fn evolve(
 }
 
 /// Where a picture comes from.
-enum Source {
+pub(crate) enum Source {
     File(PathBuf),
     Pixels(smalti::Picture),
 }
 
 impl Source {
-    fn of(picture: &Bound<'_, PyAny>) -> PyResult<Self> {
+    /// What `smalti/__init__.py` hands over: an array, a path, or why it is neither.
+    pub(crate) fn of(picture: &Bound<'_, PyAny>) -> PyResult<Self> {
         if let Ok(array) = picture.extract::<PyReadonlyArray3<'_, u8>>() {
             return picture::of_array(&array).map(Self::Pixels);
+        }
+        if picture.is_instance_of::<PyBaseException>() {
+            return Err(PyErr::from_value(picture.clone()));
         }
         picture.extract::<PathBuf>().map(Self::File)
     }
 
-    fn open(self) -> Result<smalti::Picture, Error> {
+    pub(crate) fn open(self, is_lenient: bool) -> Result<smalti::Picture, Error> {
         match self {
+            Self::File(path) if is_lenient => smalti::Picture::open_lenient(path),
             Self::File(path) => smalti::Picture::open(path),
             Self::Pixels(picture) => Ok(picture),
         }
@@ -136,71 +141,151 @@ impl<'py> Words<'_, 'py> {
     }
 }
 
-fn recipe(words: &Bound<'_, PyDict>) -> PyResult<Recipe> {
-    let mut words = Words(words, Vec::new());
-    let written = WrittenRecipe {
-        style: words.take("style")?,
-        tiles: words.take("tiles")?,
-        size: words.take("size")?,
-        seed: words.take("seed")?,
-        evals: words.take("evals")?,
-        candidates: words.take("candidates")?,
-        patience: words.take("patience")?,
-        target_sae: words.take("target_sae")?,
-        colors: words.take("colors")?,
-        color_mode: words.take("color_mode")?,
-        background: words.take("background")?,
-        shader: words.take("shader")?,
-        blend: words.take("blend")?,
-        opacity: words.take("opacity")?,
-        grout: words.take("grout")?,
-        grout_width: words.take("grout_width")?,
-        scheme: words.take("scheme")?,
-        births: words.take("births")?,
-        restarts: words.take("restarts")?,
-        ..WrittenRecipe::default()
-    };
-    let palette = words.any("palette")?;
-    let masks = words.any("mask")?;
-    let weight = words.any("weight")?;
-    let init = words.take::<PathBuf>("init")?;
-    let of_paper = [
-        words.take::<f64>("cool")?,
-        words.take("p_mutation")?,
-        words.take("p_crossover")?,
-        words.take("new_blood")?,
-        words.take("tile_scale")?,
-    ];
-    let (batch_births, mitosis) = (words.take::<u64>("batch_births")?, words.take::<u64>("mitosis")?);
-    words.end()?;
-    let [cool, p_mutation, p_crossover, new_blood, tile_scale] = of_paper;
-    let mut recipe = written
-        .recipe()
-        .map_err(|error| exception(&error))?
-        .set(init, Recipe::init_file)
-        .set(cool, Recipe::cool)
-        .set(p_mutation, Recipe::p_mutation)
-        .set(p_crossover, Recipe::p_crossover)
-        .set(new_blood, Recipe::new_blood)
-        .set(tile_scale, Recipe::tile_scale)
-        .set(batch_births, Recipe::batch_births)
-        .set(mitosis, Recipe::mitosis);
-    if let Some(palette) = palette {
-        recipe = match palette.extract::<Vec<[u8; 3]>>() {
-            Ok(colors) => recipe.palette(&colors),
-            Err(_) => recipe.palette_file(palette.extract::<PathBuf>()?),
+/// What the words ask for.
+pub(crate) struct Wanted {
+    pub(crate) recipe: Recipe,
+    /// Whether to take what is there of a file that is cut short.
+    pub(crate) is_lenient: bool,
+}
+
+impl Wanted {
+    /// The meaning of the words.
+    ///
+    /// # Errors
+    /// About the first that is unknown, of a wrong type or out of range.
+    pub(crate) fn of(words: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let mut words = Words(words, Vec::new());
+        let preset = words.any("preset")?.map(|preset| of_preset(&preset)).transpose()?;
+        let scheme_of_preset = preset.as_ref().map(|preset| preset.scheme_chosen().to_string());
+        let written = WrittenRecipe {
+            style: words.take("style")?,
+            tiles: words.take("tiles")?,
+            size: words.take("size")?,
+            seed: words.take("seed")?,
+            evals: words.take("evals")?,
+            candidates: words.take("candidates")?,
+            patience: words.take("patience")?,
+            target_sae: words.take("target_sae")?,
+            colors: words.take("colors")?,
+            color_mode: words.take("color_mode")?,
+            background: words.take("background")?,
+            shader: words.take("shader")?,
+            blend: words.take("blend")?,
+            opacity: words.take("opacity")?,
+            grout: words.take("grout")?,
+            grout_width: words.take("grout_width")?,
+            scheme: words.take("scheme")?.or(scheme_of_preset),
+            births: words.take("births")?,
+            restarts: words.take("restarts")?,
+            ..WrittenRecipe::default()
         };
+        let further = Further::of(&mut words)?;
+        let is_lenient = words.take("lenient")?.unwrap_or(false);
+        words.end()?;
+        let recipe = further.added_to(written.recipe().map_err(|error| exception(&error))?)?;
+        let recipe = if is_lenient { recipe.lenient() } else { recipe };
+        Ok(Self { recipe: recipe.set(preset.as_ref(), Recipe::over), is_lenient })
     }
-    if let Some(masks) = masks {
-        recipe = recipe.masks(all_masks(&masks)?);
+}
+
+/// A style, a scheme of the paper, or a file of the user's own.
+fn of_preset(preset: &Bound<'_, PyAny>) -> PyResult<Recipe> {
+    let path: PathBuf = preset.extract()?;
+    let is_file = path.extension().is_some_and(|ending| ending == "toml");
+    let read = if is_file { Recipe::from_preset_file(&path) } else { Recipe::named(&path.to_string_lossy()) };
+    read.map_err(|error| exception(&error))
+}
+
+/// What a written recipe does not hold, or only as text.
+struct Further<'py> {
+    palette: Option<Bound<'py, PyAny>>,
+    masks: Option<Bound<'py, PyAny>>,
+    restart_masks: Option<Bound<'py, PyAny>>,
+    weight: Option<Bound<'py, PyAny>>,
+    init: Option<Bound<'py, PyAny>>,
+    on_dry: Option<String>,
+    no_rotation: Option<bool>,
+    cool: Option<f64>,
+    p_mutation: Option<f64>,
+    p_crossover: Option<f64>,
+    new_blood: Option<f64>,
+    tile_scale: Option<f64>,
+    batch_births: Option<u64>,
+    mitosis: Option<u64>,
+}
+
+impl<'py> Further<'py> {
+    fn of(words: &mut Words<'_, 'py>) -> PyResult<Self> {
+        Ok(Self {
+            palette: words.any("palette")?,
+            masks: words.any("mask")?,
+            restart_masks: words.any("restart_mask")?,
+            weight: words.any("weight")?,
+            init: words.any("init")?,
+            on_dry: words.take("on_dry")?,
+            no_rotation: words.take("no_rotation")?,
+            cool: words.take("cool")?,
+            p_mutation: words.take("p_mutation")?,
+            p_crossover: words.take("p_crossover")?,
+            new_blood: words.take("new_blood")?,
+            tile_scale: words.take("tile_scale")?,
+            batch_births: words.take("batch_births")?,
+            mitosis: words.take("mitosis")?,
+        })
     }
-    if let Some(weight) = weight {
-        recipe = match weight.extract::<PyReadonlyArray2<'_, u8>>() {
-            Ok(map) => recipe.weight_encoded(picture::map_of_array(&map)?),
-            Err(_) => recipe.weight_file(weight.extract::<PathBuf>()?),
-        };
+
+    fn added_to(self, recipe: Recipe) -> PyResult<Recipe> {
+        let mut recipe = recipe
+            .set(self.cool, Recipe::cool)
+            .set(self.p_mutation, Recipe::p_mutation)
+            .set(self.p_crossover, Recipe::p_crossover)
+            .set(self.new_blood, Recipe::new_blood)
+            .set(self.tile_scale, Recipe::tile_scale)
+            .set(self.batch_births, Recipe::batch_births)
+            .set(self.mitosis, Recipe::mitosis)
+            .set(self.on_dry.as_deref().map(on_dry).transpose()?, Recipe::on_dry);
+        if self.no_rotation == Some(true) {
+            recipe = recipe.no_rotation();
+        }
+        if let Some(palette) = self.palette {
+            recipe = match palette.extract::<Vec<[u8; 3]>>() {
+                Ok(colors) => recipe.palette(&colors),
+                Err(_) => recipe.palette_file(palette.extract::<PathBuf>()?),
+            };
+        }
+        if let Some(masks) = self.masks {
+            recipe = recipe.masks(all_masks(&masks)?);
+        }
+        if let Some(masks) = self.restart_masks {
+            recipe = recipe.restart_masks(all_masks(&masks)?);
+        }
+        if let Some(weight) = self.weight {
+            recipe = match weight.extract::<PyReadonlyArray2<'_, u8>>() {
+                Ok(map) => recipe.weight_encoded(picture::map_of_array(&map)?),
+                Err(_) => recipe.weight_file(weight.extract::<PathBuf>()?),
+            };
+        }
+        if let Some(init) = self.init {
+            recipe = match init.cast::<Mosaic>() {
+                Ok(mosaic) => recipe.init(mosaic.get().0.population().clone()),
+                Err(_) => recipe.init_file(init.extract::<PathBuf>()?),
+            };
+        }
+        Ok(recipe)
     }
-    Ok(recipe)
+}
+
+fn on_dry(word: &str) -> PyResult<OnDry> {
+    Ok(match word {
+        "fallback" => OnDry::Fallback,
+        "restart" => OnDry::Restart,
+        "stop" => OnDry::Stop,
+        _ => {
+            return Err(PyValueError::new_err(format!(
+                "on_dry: there is no {word}; there are fallback, restart, stop"
+            )));
+        }
+    })
 }
 
 /// One mask, or a mix.

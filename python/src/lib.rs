@@ -3,6 +3,7 @@
 mod device;
 mod evolve;
 mod failure;
+mod many;
 mod mosaic;
 mod picture;
 
@@ -14,6 +15,8 @@ mod _smalti {
     use super::device::Device;
     #[pymodule_export]
     use super::evolve::evolve;
+    #[pymodule_export]
+    use super::many::{Many, evolve_many};
     #[pymodule_export]
     use super::mosaic::Mosaic;
 }

@@ -95,6 +95,12 @@ impl Mosaic {
         Ok(PyBytes::new(py, &bytes))
     }
 
+    /// The population as a file of numpy.
+    fn npz<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = py.detach(|| self.0.npz()).map_err(|error| exception(&error))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
     /// A column for each number of a tile.
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let tiles: Vec<smalti::Tile> = self.0.tiles().collect();

@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -108,6 +109,110 @@ def test_other_threads_run_and_ctrl_c_ends_the_work(cpu, pixels):
     with pytest.raises(KeyboardInterrupt):
         smalti.evolve(pixels, device=cpu, tiles=3_000, evals=2_000_000_000)
     assert len(ticks) > 10
+
+
+def test_many_pictures_are_each_as_alone(cpu, pixels):
+    pictures = [pixels, PHOTOS / "woman.jpg", pixels[:40, :60], pixels[:, ::-1]]
+    alone = [smalti.evolve(picture, device=cpu, style="mosaic", **WORDS) for picture in pictures]
+    for device in [cpu, *vulkan()]:
+        made = dict(smalti.evolve_many(iter(pictures), device=device, style="mosaic", **WORDS))
+        assert sorted(made) == [0, 1, 2, 3]
+        for number, mosaic in enumerate(alone):
+            assert (made[number].tiles == mosaic.tiles).all() and (made[number].image(150) == mosaic.image(150)).all()
+    assert list(smalti.evolve_many([], device=cpu)) == []
+
+
+def vulkan():
+    """The software driver, where there is one; what it makes must be the same."""
+    try:
+        return [smalti.Device("name:llvmpipe")]
+    except RuntimeError:
+        return []
+
+
+def test_one_bad_picture_among_many_is_told_and_the_others_are_made(cpu, pixels, tmp_path):
+    pictures = [pixels, tmp_path / "none.png", numpy.zeros((4, 4, 2), numpy.uint8), pixels]
+    made = dict(smalti.evolve_many(pictures, device=cpu, on_error="yield", **WORDS))
+    assert isinstance(made[1], OSError) and "none.png" in str(made[1])
+    assert isinstance(made[2], ValueError) and "shape" in str(made[2])
+    assert (made[0].tiles == made[3].tiles).all()
+    with pytest.raises(OSError, match="none.png"):
+        list(smalti.evolve_many([tmp_path / "none.png"], device=cpu, **WORDS))
+    with pytest.raises(ValueError, match="tiles 0"):
+        smalti.evolve_many(pictures, tiles=0)
+    with pytest.raises(ValueError, match="one picture"):
+        smalti.evolve_many("photo.jpg")
+
+
+def test_many_pictures_end_when_nobody_wants_more(cpu, pixels):
+    def endless():
+        while True:
+            yield pixels
+
+    for _, mosaic in smalti.evolve_many(endless(), device=cpu, **WORDS):
+        assert len(mosaic.tiles) > 0
+        break
+
+    def broken():
+        yield pixels
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        list(smalti.evolve_many(broken(), device=cpu, **WORDS))
+    # A process that ends in the middle of it ends all the same.
+    script = (
+        "import numpy, smalti, itertools\n"
+        "work = smalti.evolve_many(itertools.repeat(numpy.zeros((40, 40, 3), numpy.uint8)), evals=2_000_000_000)\n"
+        "import time; time.sleep(0.3)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], timeout=60).returncode == 0
+
+
+@pytest.mark.parametrize("work", ["smalti.evolve({}, evals=2_000_000_000)", "list(smalti.evolve_many([{}] * 4, evals=2_000_000_000))"])
+def test_ctrl_c_ends_a_script(work):
+    photo = str(PHOTOS / "woman.jpg")
+    script = f"import smalti\nprint('go', flush=True)\n{work.format(repr(photo))}"
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+        assert child.stdout.readline() == "go\n"
+        time.sleep(0.5)
+        child.send_signal(signal.SIGINT)
+        _, said = child.communicate(timeout=60)
+    assert "KeyboardInterrupt" in said
+
+
+def test_a_mosaic_goes_on_from_another(cpu, pixels, tmp_path):
+    first = smalti.evolve(pixels, device=cpu, style="mosaic", **WORDS)
+    first.save(tmp_path / "first.npz")
+    words = {"style": "mosaic", "size": 96, "seed": 6, "evals": 20_000}
+    of_memory = smalti.evolve(pixels, device=cpu, init=first, **words)
+    of_file = smalti.evolve(pixels, device=cpu, init=tmp_path / "first.npz", **words)
+    assert (of_memory.tiles == of_file.tiles).all() and of_memory.objective < first.objective
+    population = first.population
+    assert population["x"].shape == (150,) and population["alive"].dtype == bool
+    assert population["mask_0"].shape == (256, 256, 2)
+
+
+def test_presets_and_words_of_the_paper_mean_what_the_flags_mean(cpu, tmp_path):
+    program = os.environ.get("SMALTI")
+    if program is None:
+        pytest.skip("SMALTI names no program")
+    own = tmp_path / "own.toml"
+    own.write_text('style = "mosaic"\ngrout = "white"\n')
+    photo = PHOTOS / "parrots.png"
+    paper = {"tiles": 60, "size": 48, "births": 1_500}
+    for words in [
+        {"preset": own, **WORDS},
+        {"preset": "paint", **WORDS},
+        {"preset": "paper-3", **paper},
+        {"scheme": "paper", "restarts": 1, "cool": 0.5, "restart_mask": "flower", "on_dry": "stop", "no_rotation": True, **paper},
+    ]:
+        asked, made = tmp_path / "asked.npz", tmp_path / "made.npz"
+        given = [part for part in flags({name: value for name, value in words.items() if value is not True})]
+        given += [f"--{name.replace('_', '-')}" for name, value in words.items() if value is True]
+        command = [program, "evolve", photo, "-o", asked, "--force", "--device", "cpu", "--progress", "none", *given]
+        subprocess.run(command, check=True)
+        smalti.evolve(photo, device=cpu, **words).save(made)
+        assert made.read_bytes() == asked.read_bytes(), words
 
 
 def test_what_cannot_be_is_told_in_one_sentence(cpu, tmp_path, pixels):

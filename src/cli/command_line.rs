@@ -17,6 +17,7 @@ use crate::cli::commands::manual::{CompletionsArgs, ManArgs};
 use crate::cli::commands::merge::MergeArgs;
 use crate::cli::commands::paper::PaperArgs;
 use crate::cli::commands::plan::PlanArgs;
+use crate::cli::commands::plugins::PluginsArgs;
 use crate::cli::commands::render::RenderArgs;
 use crate::cli::commands::score::ScoreArgs;
 use crate::cli::commands::show::ShowArgs;
@@ -146,6 +147,7 @@ pub fn run(cli: &Cli) -> ExitCode {
         Command::Video(args) => commands::video::make(args),
         Command::Check(args) => commands::check::check(args),
         Command::Bench(args) => commands::bench::bench(args),
+        Command::Plugins(args) => commands::plugins::plugins(args),
         Command::Completions(args) => commands::manual::completions(args, definition()),
         Command::Man(args) => commands::manual::man(args, definition()),
     }
@@ -220,6 +222,10 @@ enum Command {
     Check(CheckArgs),
     /// Measure how fast this machine evolves pictures
     Bench(BenchArgs),
+    /// Install plug-ins for GIMP, Krita and Inkscape, and remove them
+    ///
+    /// The program carries them in itself.
+    Plugins(PluginsArgs),
     /// Print what a shell needs to complete commands and flags
     Completions(CompletionsArgs),
     /// Print a manual page, or write all of them

@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::sync_channel;
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::time::Duration;
 
 use super::device::Device;
 use super::job::Job;
@@ -21,10 +22,14 @@ use crate::vk::DeviceKind;
 
 /// Most pictures that evolve at the same time on a GPU, and on software Vulkan.
 const LANES: (usize, usize) = (256, 16);
+/// Time after which a thread that waits for mosaics asks whether they are still wanted.
+const BETWEEN_QUESTIONS: Duration = Duration::from_millis(50);
 
 /// Makes many mosaics. `done` is called with the number of a picture, from 0, and what became of it, as pictures end:
-/// in any order. When it returns false, all work ends. Each mosaic has the bytes that [`Recipe::make`] gives it,
+/// in any order. When it returns false, all work ends, too. Each mosaic has the bytes that [`Recipe::make`] gives it,
 /// whatever else is made beside it. A picture that fails does not stop the others.
+///
+/// `goes_on` is asked between two steps of the work, some twenty times a second; when it returns false, all work ends.
 ///
 /// `tasks` gives pictures as they are needed: one for each thread of the CPU, up to 256 that share a device. So a
 /// folder of any size can be made; `tasks` must not wait for `done`. An error in the place of a picture is handed to
@@ -35,13 +40,14 @@ const LANES: (usize, usize) = (256, 16);
 pub fn make_all(
     device: &Device,
     tasks: impl Iterator<Item = Result<(Picture, Recipe)>> + Send,
+    mut goes_on: impl FnMut() -> bool,
     mut done: impl FnMut(usize, Result<Mosaic>) -> bool,
 ) -> Result<()> {
     match device.open_crew() {
-        Ok(Some(crew)) => as_lanes(device, crew, tasks, &mut done),
-        Ok(None) => side_by_side(device, tasks, &mut done),
+        Ok(Some(crew)) => as_lanes(device, crew, tasks, &mut goes_on, &mut done),
+        Ok(None) => side_by_side(device, tasks, &mut goes_on, &mut done),
         // As for one picture, the CPU stands in for a device that nobody asked for.
-        Err(_) if !device.is_asked_for() => side_by_side(&Device::cpu(), tasks, &mut done),
+        Err(_) if !device.is_asked_for() => side_by_side(&Device::cpu(), tasks, &mut goes_on, &mut done),
         Err(error) => Err(error),
     }
 }
@@ -74,6 +80,7 @@ impl Drop for EndsAll<'_> {
 fn side_by_side(
     device: &Device,
     tasks: impl Iterator<Item = Result<(Picture, Recipe)>> + Send,
+    is_wanted: &mut dyn FnMut() -> bool,
     done: &mut dyn FnMut(usize, Result<Mosaic>) -> bool,
 ) -> Result<()> {
     let tasks = Mutex::new(tasks.fuse().enumerate());
@@ -102,15 +109,20 @@ fn side_by_side(
         };
         if pools.iter().map_while(start).count() == 0 {
             while let Some((number, task)) = next() {
-                if !done(number, make(task)) {
+                if !done(number, make(task)) || !is_wanted() {
                     return;
                 }
             }
         }
         drop(made_in);
         let _ends_all = EndsAll(&has_ended);
-        while let Ok((number, mosaic)) = made.recv() {
-            if !done(number, mosaic) {
+        loop {
+            let goes_on = match made.recv_timeout(BETWEEN_QUESTIONS) {
+                Ok((number, mosaic)) => done(number, mosaic) && is_wanted(),
+                Err(RecvTimeoutError::Timeout) => is_wanted(),
+                Err(RecvTimeoutError::Disconnected) => false,
+            };
+            if !goes_on {
                 return;
             }
         }
@@ -123,6 +135,7 @@ fn as_lanes(
     device: &Device,
     mut crew: Crew,
     tasks: impl Iterator<Item = Result<(Picture, Recipe)>>,
+    goes_on: &mut dyn FnMut() -> bool,
     done: &mut dyn FnMut(usize, Result<Mosaic>) -> bool,
 ) -> Result<()> {
     let is_software = device.vulkan().is_some_and(|device| device.info().kind == DeviceKind::Cpu);
@@ -163,6 +176,9 @@ fn as_lanes(
             }
         }
         if aboard.is_empty() {
+            return Ok(());
+        }
+        if !goes_on() {
             return Ok(());
         }
         for finished in crew.step()? {

@@ -159,7 +159,8 @@ impl Recipe {
     }
 
     /// This recipe, with what `preset` says where it says nothing. What it contradicts counts as not said.
-    pub(crate) fn over(mut self, preset: &Self) -> Self {
+    #[must_use]
+    pub fn over(mut self, preset: &Self) -> Self {
         let (own, other) = (&mut self.choices, &preset.choices);
         let (mut of_own, mut of_other) = (self.numbers, preset.numbers);
         if own.init.is_some() {
@@ -172,6 +173,7 @@ impl Recipe {
         let has_grout = of_own.grout_width.is_none() || other.grout != Some(GroutColor::None);
         of_own = of_own.or(of_other);
         let Choices { style, colors, color_mode, background, masks, shader, blend, grout, .. } = other.clone();
+        own.paper_preset = own.paper_preset.or(other.paper_preset);
         own.style = own.style.take().or(style);
         own.colors = own.colors.take().or(colors);
         own.color_mode = own.color_mode.or(color_mode);

@@ -242,6 +242,26 @@ fn a_dash_sends_the_picture_to_stdout() {
 }
 
 #[test]
+fn stdout_gets_the_format_that_is_asked_for() {
+    let workshop = Workshop::new();
+    for ending in ["png", "jpg", "webp", "svg", "ora", "npz", "csv", "json"] {
+        workshop.evolve(&format!("-o a.{ending} -o tiles.npz --force"));
+        let ran = workshop.evolve(&format!("-o - --format {ending}"));
+        assert!(ran.stdout == workshop.read(&format!("a.{ending}")), "{ending}");
+    }
+    let drawn = workshop.run("render tiles.npz -o - --format .SVG -q");
+    assert!(drawn.stdout.starts_with(b"<"), "{}", drawn.stderr);
+    for (flags, sentence) in [
+        ("-o - --format bmp", "--format bmp: there are png, jpg"),
+        ("-o b.png --format svg", "--format svg: is for -o -"),
+    ] {
+        let ran = workshop.run(&format!("evolve photo.png {flags}"));
+        assert_eq!((ran.code, ran.stderr.lines().count()), (Some(2), 1), "{}", ran.stderr);
+        assert!(ran.stderr.contains(sentence), "{}", ran.stderr);
+    }
+}
+
+#[test]
 fn a_reader_that_goes_away_needs_no_row_but_misses_a_picture() {
     let workshop = Workshop::new();
     for (output, code, message) in

@@ -258,24 +258,29 @@ fn a_folder_on_one_device_gives_each_picture_its_own_bytes() {
         let tasks = pairs.iter().cloned().map(Ok).chain(std::iter::once_with(broken));
         let mut made = vec![None; pairs.len()];
         let mut refusals = vec![];
-        make_all(&device, tasks, |number, mosaic| {
+        let keep = |number: usize, mosaic: smalti::Result<Mosaic>| {
             match mosaic {
                 Ok(mosaic) => made[number] = Some(mosaic.npz().unwrap()),
                 Err(error) => refusals.push((number, error.to_string())),
             }
             true
-        })
-        .unwrap();
+        };
+        make_all(&device, tasks, || true, keep).unwrap();
         assert!(made.iter().map(Option::as_ref).eq(alone.iter().map(Some)), "on {}", device.label());
         assert!(matches!(&refusals[..], [(6, sentence)] if sentence.contains("none.png: there is no such file")));
     }
     let mut count = 0;
-    make_all(&Device::cpu(), pairs.iter().cloned().map(Ok), |_, _| {
+    let first = |_, _| {
         count += 1;
         false
-    })
-    .unwrap();
+    };
+    make_all(&Device::cpu(), pairs.iter().cloned().map(Ok), || true, first).unwrap();
     assert_eq!(count, 1, "nothing is told after the end");
+    for device in [Device::cpu(), Device::named("name:llvmpipe").unwrap()] {
+        // Hours of work, which nobody wants.
+        let tasks = pictures.iter().map(|picture| Ok((picture.clone(), quick().evals(1_000_000_000))));
+        make_all(&device, tasks, || false, |number, _| panic!("{number} was made on {}", device.label())).unwrap();
+    }
 }
 
 #[test]
@@ -335,7 +340,9 @@ fn what_cannot_be_is_refused_by_its_name() {
     assert_eq!(refused(mosaic.resized(0, &device)).0, "output_size");
     assert_eq!(refused(mosaic.resized(65_536, &device)).0, "output_size");
     assert!(mosaic.save("mosaic.xyz").unwrap_err().to_string().starts_with("mosaic.xyz: does not end in .png"));
-    assert_eq!(refused(mosaic.resized(16_384, &device).unwrap().webp()).0, "output_size");
+    // A line, since its square would take a minute to draw.
+    let line = quietly(&Recipe::new().tiles(2).evals(9), &Picture::from_rgb8(256, 1, &[9; 768]).unwrap());
+    assert_eq!(refused(line.resized(16_384, &device).unwrap().webp()).0, "output_size");
 }
 
 #[test]

@@ -50,6 +50,8 @@ mod paper;
 mod paper_lanes;
 mod places;
 #[cfg(unix)]
+mod plugins;
+#[cfg(unix)]
 mod printed_commands;
 mod reference;
 mod render;

@@ -14,7 +14,7 @@ use crate::evolve::{ColorMode, Ended, Evolution, PaperScheme, Undisturbed};
 use crate::model::cells::{Course, Search};
 use crate::model::{Backdrop, Blend, Canvas, Change, Fly, Population, Scene, Target};
 use crate::shapes::{BuiltIn, Shader};
-use crate::studio::{self, Device, Mask, OpenedSearch, Picture, Recipe, make_all};
+use crate::studio::{self, Device, Mask, Mosaic, OpenedSearch, Picture, Recipe, make_all};
 
 /// The picture is cut from one with sides of so many px.
 const SIDE_PX: u32 = 256;
@@ -243,13 +243,14 @@ fn lanes(device: &Device) -> Result<Vec<Part>> {
         Ok((picture, Recipe::named(style)?.tiles(60).seed(lane as u64).evals(2_000)))
     };
     let mut made: Vec<Option<Result<Vec<Part>>>> = (0..LANES).map(|_| None).collect();
-    make_all(device, (0..LANES).map(task), |lane, mosaic| {
+    let keep = |lane: usize, mosaic: Result<Mosaic>| {
         made[lane] = Some(mosaic.map(|mosaic| {
             let counts = [mosaic.sae() as i64, mosaic.evals() as i64, mosaic.births() as i64];
             vec![Part::new("picture", &["SAE", "evals", "births"], counts), Part::flies(&mosaic.population().flies)]
         }));
         true
-    })?;
+    };
+    make_all(device, (0..LANES).map(task), || true, keep)?;
     let missing = || Err(Error::Internal("a picture is missing".to_owned()));
     let parts: Vec<Vec<Part>> = made.into_iter().map(|made| made.unwrap_or_else(missing)).collect::<Result<_>>()?;
     Ok(parts.into_iter().flatten().collect())

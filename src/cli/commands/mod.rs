@@ -10,6 +10,7 @@ pub(crate) mod manual;
 pub(crate) mod merge;
 pub(crate) mod paper;
 pub(crate) mod plan;
+pub(crate) mod plugins;
 pub(crate) mod render;
 pub(crate) mod score;
 pub(crate) mod show;

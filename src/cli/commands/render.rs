@@ -46,9 +46,12 @@ pub(crate) struct RenderArgs {
 
     /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; repeat it for more
     ///
-    /// .npz, .csv and .json hold the tiles themselves. - writes a PNG to stdout.
+    /// .npz, .csv and .json hold the tiles themselves. - writes to stdout what --format says.
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
+    /// Format of what -o - writes: png, jpg, webp, svg, ora, npz, csv or json [default: png]
+    #[arg(long, value_name = "EXT", value_parser = values::ending, help_heading = "Output")]
+    pub format: Option<String>,
     /// Replace files that smalti did not write, or wrote with other options
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -110,7 +113,7 @@ impl RenderOptions {
         let supersampling = args.supersample.map(|count| values::in_range("--supersample", count, samples));
         let options = Self {
             input: args.input.clone(),
-            outputs: args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?,
+            outputs: Destination::for_results(&args.outputs, args.format.as_deref())?,
             overwrite: if args.force { Overwrite::Force } else { Overwrite::Refuse },
             output_long_side_px: args.output_size.map(|px| values::side_px("--output-size", px)).transpose()?,
             background: args.background,

@@ -41,14 +41,34 @@ impl Destination {
         }
         let ending = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_lowercase();
         let path = path.display();
-        Err(Error::Usage(if ["gif", "apng", "mp4", "webm"].contains(&ending.as_str()) {
-            format!(
-                "{path}: a mosaic is a still picture, such as .png; to watch it evolve, add --save-run run, and then run \
-                 smalti timelapse run -o {path}"
-            )
+        Err(Error::Usage(if moves(&ending) {
+            still(&path.to_string(), &path.to_string())
         } else {
             format!("{path}: an output must end in .png, .jpg, .jpeg, .webp, .svg, .ora, .npz, .json or .csv, or be -")
         }))
+    }
+
+    /// The destinations of a result; the ending of a path tells what is written to it, and `format` what to stdout.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names the path or the format.
+    pub(crate) fn for_results(paths: &[PathBuf], format: Option<&str>) -> Result<Vec<Self>> {
+        let mut found: Vec<Self> = paths.iter().map(|path| Self::for_result(path)).collect::<Result<_>>()?;
+        let Some(format) = format else { return Ok(found) };
+        let content = Content::of_path(&Path::new("mosaic").with_extension(format)).ok_or_else(|| {
+            Error::Usage(if moves(format) {
+                still(&format!("--format {format}"), &format!("mosaic.{format}"))
+            } else {
+                format!("--format {format}: there are png, jpg, jpeg, webp, svg, ora, npz, json and csv")
+            })
+        })?;
+        let Some(stdout) = found.iter_mut().find(|destination| destination.is_stdout()) else {
+            return Err(Error::Usage(format!(
+                "--format {format}: is for -o -; of a file the ending of -o decides the format, so drop the flag"
+            )));
+        };
+        stdout.content = content;
+        Ok(found)
     }
 
     /// The destination of the fitted picture.
@@ -89,6 +109,19 @@ impl Destination {
         // Devices and pipes are not replaced.
         !self.is_stdout() && self.path.is_file()
     }
+}
+
+/// Whether a file with this ending is an animation.
+fn moves(ending: &str) -> bool {
+    ["gif", "apng", "mp4", "webm"].contains(&ending)
+}
+
+/// What to do instead of writing an animation of one mosaic.
+fn still(asked: &str, path: &str) -> String {
+    format!(
+        "{asked}: a mosaic is a still picture, such as .png; to watch it evolve, add --save-run run, and then run smalti \
+         timelapse run -o {path}"
+    )
 }
 
 /// What is written to a path: as its ending tells, and a PNG to stdout.

@@ -82,9 +82,13 @@ pub(crate) struct EvolveArgs {
 
     /// File to write: .png .jpg .webp .svg .ora .npz .csv .json; repeat it for more
     ///
-    /// .npz, .csv and .json hold the tiles themselves; smalti render draws a .npz again. - writes a PNG to stdout.
+    /// .npz, .csv and .json hold the tiles themselves; smalti render draws a .npz again. - writes to stdout what
+    /// --format says.
     #[arg(short, long = "output", value_name = "OUT", required = true, help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
+    /// Format of what -o - writes: png, jpg, webp, svg, ora, npz, csv or json [default: png]
+    #[arg(long, value_name = "EXT", value_parser = values::ending, help_heading = "Output")]
+    pub format: Option<String>,
     /// Do again what was done in the window: the script that it saved decides all but the picture and the outputs
     #[arg(long, value_name = "SCRIPT", conflicts_with_all = NOT_WITH_REPLAY, help_heading = "Picture")]
     pub replay: Option<PathBuf>,
@@ -159,7 +163,7 @@ impl EvolveOptions {
     /// [`crate::Error::Usage`] or [`crate::Error::Parameter`] that names the flag and its range.
     pub fn new(args: &EvolveArgs) -> Result<Self> {
         let validation = if args.validate { Validation::On } else { Validation::Off };
-        let outputs = args.outputs.iter().map(|path| Destination::for_result(path)).collect::<Result<_>>()?;
+        let outputs = Destination::for_results(&args.outputs, args.format.as_deref())?;
         let files = Files {
             save_target: args.save_target.as_deref().map(Destination::for_target).transpose()?,
             curves: args.curves.iter().map(|path| CurveFile::new(path)).collect::<Result<_>>()?,
