@@ -118,6 +118,10 @@ def mask(layer, *buffers):
     target.process()
     layer_mask.get_buffer().flush()
     layer.add_mask(layer_mask)
+    # GIMP would paint on the mask from now on, and call the next filter for it.
+    layer.set_edit_mask(False)
+    # Its thumbnail would stay white.
+    layer_mask.update(0, 0, layer.get_width(), layer.get_height())
 
 
 def only_layer(image, drawables):

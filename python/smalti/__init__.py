@@ -191,8 +191,8 @@ def evolve_many(
 
     >>> import numpy, smalti
     >>> pictures = [numpy.full((8, 12, 3), grey, numpy.uint8) for grey in (0, 255)]
-    >>> {number: mosaic.size for number, mosaic in smalti.evolve_many(pictures, tiles=4)}
-    {0: (12, 8), 1: (12, 8)}
+    >>> sorted((number, mosaic.size) for number, mosaic in smalti.evolve_many(pictures, tiles=4))
+    [(0, (12, 8)), (1, (12, 8))]
     """
     if on_error not in ("raise", "yield"):
         raise ValueError(f"on_error: {on_error!r} is neither 'raise' nor 'yield'")

@@ -132,7 +132,7 @@ const WRONG_FLAGS: [(&[&str], Right); 43] = [
     (&["--debug", "--verbosity", "--log"], Flag("verbose", "write -v")),
     (&["--dryrun", "--simulate"], Flag("dry-run", "write --dry-run")),
     (
-        &["--format", "--ext", "--extension", "--output-format"],
+        &["--ext", "--extension", "--output-format"],
         Flag(
             "save-run",
             "the ending of -o decides the format, as in -o mosaic.jpg; for a GIF of the evolution add --save-run run, then smalti timelapse run -o mosaic.gif",

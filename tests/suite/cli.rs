@@ -299,6 +299,20 @@ fn progress_in_json_has_one_object_a_line() {
 }
 
 #[test]
+fn an_evolution_ends_when_the_reader_of_its_progress_goes_away() {
+    let workshop = Workshop::new();
+    for (output, code) in [("a.png", 75), ("-", 1)] {
+        // The time only ends a test that fails.
+        let line =
+            format!("evolve photo.png --scheme paper -o {output} -n 60 --births 1000M --time 5m --progress json");
+        let mut child = workshop.command(&line).spawn().unwrap();
+        drop((child.stderr.take(), child.stdout.take()));
+        assert_eq!(child.wait().unwrap().code(), Some(code), "{output}");
+    }
+    assert_eq!(metadata(&workshop, "a.png")["status"], "partial");
+}
+
+#[test]
 fn devices_are_listed_for_people_and_for_programs() {
     let workshop = Workshop::new();
     let table = String::from_utf8(workshop.run("devices").stdout).unwrap();

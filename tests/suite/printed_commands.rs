@@ -10,12 +10,13 @@ use serde_json::Value;
 
 use crate::workshop::Workshop;
 
-const DOCUMENTS: [&str; 12] = [
+const DOCUMENTS: [&str; 13] = [
     "README.md",
     "docs/batch.md",
     "docs/cluster.md",
     "docs/gallery/README.md",
     "docs/paper.md",
+    "docs/plugins.md",
     "docs/recipes.md",
     "docs/reference.md",
     "docs/security.md",
@@ -26,9 +27,12 @@ const DOCUMENTS: [&str; 12] = [
 ];
 
 /// What is replaced in every command, manifest and preset, so that all takes seconds.
-const SMALLER: [(&str, &str); 18] = [
+const SMALLER: [(&str, &str); 20] = [
     // A window needs a display; it is opened in `window.rs`.
     ("smalti view ", "smalti view --help "),
+    // GIMP's compiler may not be there, and no other host; `tests/doors` has them.
+    ("smalti plugins install gimp2", "smalti plugins status gimp2"),
+    ("smalti plugins install", "smalti plugins install krita"),
     ("--output-size 1080", "--output-size 64"),
     ("--output-size 4096", "--output-size 64"),
     ("--output-size 4134", "--output-size 64"),
@@ -59,7 +63,7 @@ const STEPS: &str = r#"{"smalti": "script", "version": 1, "input-sha256": "", "s
 const SIZE_PX: (u32, u32) = (24, 18);
 
 /// Programs that a test machine lacks: why, and the script that stands in for each.
-const STAND_INS: [(&str, &str, &str); 8] = [
+const STAND_INS: [(&str, &str, &str); 9] = [
     ("sbatch", "needs a cluster; here every task of the script's array runs at once", SBATCH),
     ("kubectl", "needs a cluster; here the file must be there", "test -s \"${@: -1}\""),
     ("cargo", "builds this program", ""),
@@ -68,6 +72,11 @@ const STAND_INS: [(&str, &str, &str); 8] = [
         "ssh",
         "needs other machines; here they are this one",
         "until [ \"$1\" = -- ]; do shift; done\nshift\nsh -c \"$*\"",
+    ),
+    (
+        "gmic",
+        "tests/doors has it; here it hands on what it gets",
+        "if [ \"$1\" = -.png ]; then cat > \"${@: -1}\"; else cat \"$1\"; fi",
     ),
     ("nvidia-smi", "needs a GPU of NVIDIA", "echo GPU-00000000-0000-0000-0000-000000000000"),
     ("renderdoccmd", "tools/capture tests it; here smalti runs without it", RENDERDOCCMD),
@@ -249,7 +258,7 @@ impl Scratch {
         let paths = std::iter::once(self.programs.path().to_owned()).chain(paths);
         command.env("PATH", std::env::join_paths(paths).unwrap());
         command.env("SMALTI_DEVICE", "cpu").env("SMALTI_CONFIG", self.workshop.path("small.toml"));
-        command.env("HOME", self.programs.path()).stdin(Stdio::null());
+        command.env("HOME", self.programs.path()).env_remove("XDG_DATA_HOME").stdin(Stdio::null());
         command.args(["-o", "pipefail", "-c", line]).current_dir(self.workshop.path("."));
         let output = command.output().expect("bash is there");
         if !output.status.success() {
@@ -318,6 +327,11 @@ fn gallery() {
 #[test]
 fn paper() {
     follow("docs/paper.md");
+}
+
+#[test]
+fn plugins() {
+    follow("docs/plugins.md");
 }
 
 #[test]

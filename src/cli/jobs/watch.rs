@@ -92,7 +92,7 @@ impl<'a> Watch<'a> {
         self.last_look = elapsed;
         if self.progress.is_due(elapsed) {
             let stage = stage();
-            self.progress.show(&EvolutionProgress {
+            let is_heard = self.progress.show(&EvolutionProgress {
                 elapsed,
                 unit: self.unit,
                 count: stage.evals,
@@ -101,6 +101,9 @@ impl<'a> Watch<'a> {
                 error: stage.error.unsigned_abs(),
                 time_limit: self.time_limit,
             });
+            if !is_heard {
+                return Some(StopReason::Interrupted);
+            }
         }
         self.time_limit.is_some_and(|limit| elapsed >= limit).then_some(StopReason::Time)
     }

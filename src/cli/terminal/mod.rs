@@ -78,6 +78,12 @@ pub(crate) fn say(line: &str) {
     let _ = writeln!(io::stderr(), "{}", shown(line));
 }
 
+/// As [`say`]; whether there is still somebody who may read it.
+fn say_to_reader(line: &str) -> bool {
+    let said = writeln!(io::stderr(), "{}", shown(line));
+    said.map_err(|error| error.kind()) != Err(io::ErrorKind::BrokenPipe)
+}
+
 /// The exit code for an outcome. A failure is printed.
 pub(crate) fn exit_code(done: Result<()>) -> ExitCode {
     match done {

@@ -7,7 +7,7 @@ use clap::ValueEnum;
 use indicatif::{HumanCount, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Map, Value};
 
-use super::{Verbosity, say, shown};
+use super::{Verbosity, say, say_to_reader, shown};
 
 /// How progress is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -136,8 +136,9 @@ impl Progress {
         elapsed >= self.next
     }
 
-    /// Shows how far the work has come.
-    pub(crate) fn show(&mut self, standing: &impl Stage) {
+    /// Shows how far the work has come. False if a program has asked for it, and has gone away since: then nobody waits
+    /// for the work any more.
+    pub(crate) fn show(&mut self, standing: &impl Stage) -> bool {
         self.next = standing.elapsed() + self.form.interval();
         match &self.form {
             Form::Nothing => {}
@@ -147,8 +148,9 @@ impl Progress {
                 bar.set_message(shown(&line(standing, self.verbosity)).into_owned());
             }
             Form::Plain => say(&line(standing, self.verbosity)),
-            Form::Json => say(&json_line(standing)),
+            Form::Json => return say_to_reader(&json_line(standing)),
         }
+        true
     }
 
     /// Prints a line above the bar, if there is one.

@@ -203,6 +203,7 @@ def check_selection():
     at = (box[0] + 5, box[1] + 3, width, height)
     soft = pixels(image.get_selection(), "Y float", at)
     check("the selection is its mask, soft edges and all", new and pixels(new.get_mask(), "Y float") == soft)
+    check("what is chosen is the layer, not its mask", new and image.get_selected_drawables() == [new])
     check("the selection is still there", not Gimp.Selection.is_empty(image))
 
     before = pixels(layer)
@@ -282,9 +283,10 @@ def check_kinds():
         new, said = call(image, [layer], **QUICK)
         # GIMP's own conversion of the program's pixels.
         converted = Gimp.Layer.new_from_drawable(mosaic.get_layers()[0], image)
-        check(
-            f"{what}: the pixels of the program, as GIMP converts them", new and pixels(new) == pixels(converted), said
-        )
+        is_same = new and pixels(new) == pixels(converted)
+        check(f"{what}: the pixels of the program, as GIMP converts them", is_same, said)
+        call(image, [layer], new_layer=False, **QUICK)
+        check("instead of the layer's, too", pixels(layer) == pixels(converted))
         for old in (source, mosaic, image):
             old.delete()
     photo.delete()

@@ -1,6 +1,6 @@
 # shellcheck shell=bash disable=SC2154
-# What the plug-in does in a window of GIMP 3: `run` sources this. xdotool is the person's hands, and the title of GIMP's
-# window, which tells the number of layers, is what the person looks at.
+# What the plug-in does in a window of GIMP 3: `run` sources this. xdotool is the person's hands. What is looked at is
+# the title of GIMP's window, which tells the number of layers.
 
 # Waits up to a minute until a command succeeds: within_a_minute WHAT COMMAND...
 within_a_minute() {
