@@ -165,12 +165,15 @@ def evolved(program, part, config, progress):
         size=ask("size"),
         output_size=output_size,
     )
-    source = part.layer
-    if ask("new-layer") and source.get_filters():
+    if ask("new-layer") and part.layer.get_filters():
         # The mosaic is of what is seen. It is laid above, where the layer's effects do not reach it.
-        source = source.copy()
-        source.merge_filters()
-    made = smalti_program.evolve(program, part.picture(source), options, progress=progress)
+        merged = part.layer.copy()
+        merged.merge_filters()
+        picture = part.picture(merged)
+        merged.delete()
+    else:
+        picture = part.picture(part.layer)
+    made = smalti_program.evolve(program, picture, options, progress=progress)
     try:
         stream = Gio.MemoryInputStream.new_from_bytes(GLib.Bytes.new(made))
         mosaic = GdkPixbuf.Pixbuf.new_from_stream(stream, None).add_alpha(False, 0, 0, 0)
@@ -210,9 +213,21 @@ def lay_above(part, mosaic):
     return new
 
 
+def over_pixels(part, mosaic):
+    """The mosaic over the layer's own pixels, which a layer without transparency keeps where the mosaic is clear."""
+    width, height = part.width, part.height
+    own = read(part.layer.get_buffer(), Gegl.Rectangle.new(part.x, part.y, width, height), RGBA)
+    colors = GdkPixbuf.Colorspace.RGB
+    whole = GdkPixbuf.Pixbuf.new_from_bytes(GLib.Bytes.new(own), colors, True, 8, width, height, 4 * width).copy()
+    mosaic.composite(whole, 0, 0, width, height, 0, 0, 1, 1, GdkPixbuf.InterpType.NEAREST, 255)
+    return whole
+
+
 def lay_over(part, mosaic):
     """The mosaic instead of the layer's pixels, as far as they are selected; that is one step of undo by itself."""
     layer = part.layer
+    if not layer.has_alpha():
+        mosaic = over_pixels(part, mosaic)
     write(layer.get_shadow_buffer(), part.x, part.y, mosaic)
     layer.merge_shadow(True)
     layer.update(part.x, part.y, part.width, part.height)

@@ -16,17 +16,18 @@ and the same files as ``smalti evolve`` writes.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import io
 import os
 import weakref
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Iterable
 from typing import Any, Literal
 
 import numpy
 
 from ._smalti import Device, Many as _Many, Mosaic as _Mosaic, evolve as _evolve, evolve_many as _evolve_many
 
-__all__ = ["TILE", "Device", "Mosaic", "evolve", "evolve_many"]
+__all__ = ["TILE", "Device", "Mosaic", "Mosaics", "evolve", "evolve_many"]
 
 #: What :attr:`Mosaic.tiles` holds of each tile. Lengths and places are in px of the evolved picture, where pixel
 #: (i, j) has its centre at x = i, y = j, and y points down.
@@ -179,10 +180,10 @@ def evolve_many(
     device: Device | None = None,
     on_error: Literal["raise", "yield"] = "raise",
     **words: Any,
-) -> Generator[tuple[int, Any], None, None]:
+) -> Mosaics:
     """Evolves many pictures at once, on all cores or as lanes of a device.
 
-    Yields pairs of a number, counted from 0 in the order of ``pictures``, and its :class:`Mosaic`, as they end: in any
+    Gives pairs of a number, counted from 0 in the order of ``pictures``, and its :class:`Mosaic`, as they end: in any
     order. Each mosaic is the one that :func:`evolve` makes with the same words. ``pictures`` is read as pictures are
     needed, by another thread, so it may be a generator that never ends; leave the loop, and the work ends.
 
@@ -199,29 +200,54 @@ def evolve_many(
     if isinstance(pictures, (str, bytes, os.PathLike)):
         raise ValueError("pictures: is one picture, and must be several; smalti.evolve makes a mosaic of one")
     many = _evolve_many(_Pictures(pictures), _checked(words), device)
-    taken = _taken(many, on_error == "raise")
-    _at_work.add(many)
-    return taken
+    mosaics = Mosaics(many, on_error == "raise")
+    _at_work.add(mosaics)
+    return mosaics
+
+
+class Mosaics:
+    """Mosaics as they end: what :func:`evolve_many` returns. The work ends with the loop, or by ``close()``."""
+
+    def __init__(self, many: _Many, is_raised: bool) -> None:
+        self._many = many
+        self._is_raised = is_raised
+
+    def __iter__(self) -> Mosaics:
+        return self
+
+    def __next__(self) -> tuple[int, Any]:
+        try:
+            number, made = next(self._many)
+            if isinstance(made, BaseException) and self._is_raised:
+                raise made
+        except BaseException:
+            self.close()
+            raise
+        return number, made if isinstance(made, BaseException) else Mosaic(made)
+
+    def close(self) -> None:
+        """Ends the work; nothing comes any more."""
+        self._many.close()
+
+    def __enter__(self) -> Mosaics:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __del__(self) -> None:
+        self.close()
 
 
 #: What still works when the interpreter ends must end first, since it reads pictures by it.
-_at_work: weakref.WeakSet[_Many] = weakref.WeakSet()
+_at_work: weakref.WeakSet[Mosaics] = weakref.WeakSet()
 
 
 @atexit.register
 def _end_all() -> None:
-    for many in list(_at_work):
-        many.close()
-
-
-def _taken(many: _Many, is_raised: bool) -> Generator[tuple[int, Any], None, None]:
-    try:
-        for number, made in many:
-            if isinstance(made, BaseException) and is_raised:
-                raise made
-            yield number, made if isinstance(made, BaseException) else Mosaic(made)
-    finally:
-        many.close()
+    for mosaics in list(_at_work):
+        with contextlib.suppress(Exception):
+            mosaics.close()
 
 
 class _Pictures:

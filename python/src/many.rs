@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -19,6 +19,10 @@ use crate::mosaic::Mosaic;
 
 /// Time between two looks for a signal.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+/// Time between two looks whether the work has ended.
+const BETWEEN_CHECKS: Duration = Duration::from_millis(5);
+/// How long an end waits for an iterator that gives no next picture, such as one that reads an empty queue.
+const READING_MAX: Duration = Duration::from_secs(1);
 /// Mosaics that are finished and not taken yet, at most.
 const WAITING_MAX: usize = 16;
 
@@ -31,6 +35,8 @@ pub(crate) struct Many {
     made: Mutex<Option<Receiver<Made>>>,
     worker: Mutex<Option<JoinHandle<PyResult<()>>>>,
     is_over: Arc<AtomicBool>,
+    /// Whether the iterator of Python is asked for a picture.
+    is_reading: Arc<AtomicBool>,
     device: Option<Py<Device>>,
 }
 
@@ -46,12 +52,14 @@ pub(crate) fn evolve_many(
     let wanted = Wanted::of(words)?;
     let device = device.map(|device| device.clone().unbind());
     let is_over = Arc::new(AtomicBool::new(false));
+    let is_reading = Arc::new(AtomicBool::new(false));
     let (sender, made) = sync_channel(WAITING_MAX);
     let worker = Worker {
         pictures: Pictures {
             pictures: pictures.clone().unbind(),
             wanted,
             count: 0,
+            is_reading: Arc::clone(&is_reading),
             refused: Arc::default(),
             raised: Arc::default(),
         },
@@ -61,7 +69,7 @@ pub(crate) fn evolve_many(
     };
     let started = std::thread::Builder::new().name("smalti".to_owned()).spawn(move || worker.work());
     let worker = started.map_err(|error| PyRuntimeError::new_err(format!("no thread can be started: {error}")))?;
-    Ok(Many { made: Mutex::new(Some(made)), worker: Mutex::new(Some(worker)), is_over, device })
+    Ok(Many { made: Mutex::new(Some(made)), worker: Mutex::new(Some(worker)), is_over, is_reading, device })
 }
 
 #[pymethods]
@@ -89,16 +97,30 @@ impl Many {
         }
     }
 
-    /// Ends the work, and waits until it has ended.
+    /// Ends the work, and waits until it has ended. It waits not long for an iterator that gives no next picture.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         self.is_over.store(true, Ordering::Relaxed);
-        py.detach(|| {
-            // Without a receiver nobody waits to hand something over.
-            drop(self.made.lock().unwrap_or_else(PoisonError::into_inner).take());
-            let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner).take();
-            let Some(worker) = worker else { return Ok(()) };
-            worker.join().unwrap_or_else(|_| Err(PyRuntimeError::new_err("a thread of smalti has panicked")))
-        })
+        // Without a receiver nobody waits to hand something over.
+        py.detach(|| drop(self.made.lock().unwrap_or_else(PoisonError::into_inner).take()));
+        let Some(worker) = self.worker.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
+        let mut read_since = None;
+        while !worker.is_finished() {
+            py.detach(|| std::thread::sleep(BETWEEN_CHECKS));
+            py.check_signals()?;
+            if !self.is_reading.load(Ordering::Relaxed) {
+                read_since = None;
+            } else if read_since.get_or_insert_with(Instant::now).elapsed() > READING_MAX {
+                return Ok(());
+            }
+        }
+        let panicked = |_| Err(PyRuntimeError::new_err("a thread of smalti has panicked"));
+        worker.join().unwrap_or_else(panicked)
+    }
+}
+
+impl Drop for Many {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
     }
 }
 
@@ -134,6 +156,7 @@ struct Pictures {
     pictures: Py<PyIterator>,
     wanted: Wanted,
     count: usize,
+    is_reading: Arc<AtomicBool>,
     /// Why pictures were refused that are none, by their number.
     refused: Arc<Mutex<HashMap<usize, PyErr>>>,
     /// What the iterator of Python raised.
@@ -144,6 +167,7 @@ impl Iterator for Pictures {
     type Item = Result<(smalti::Picture, Recipe), Error>;
 
     fn next(&mut self) -> Option<Self::Item> {
+        self.is_reading.store(true, Ordering::Relaxed);
         // An interpreter that is about to end gives nothing more.
         let source = Python::try_attach(|py| {
             let next = self.pictures.bind(py).clone().next()?;
@@ -154,7 +178,9 @@ impl Iterator for Pictures {
                     None
                 }
             }
-        })??;
+        });
+        self.is_reading.store(false, Ordering::Relaxed);
+        let source = source??;
         let number = self.count;
         self.count += 1;
         Some(match source {

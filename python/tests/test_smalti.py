@@ -159,6 +159,14 @@ def test_many_pictures_end_when_nobody_wants_more(cpu, pixels):
 
     with pytest.raises(ZeroDivisionError):
         list(smalti.evolve_many(broken(), device=cpu, **WORDS))
+    # An iterator that waits for something stops nobody.
+    waiting = threading.Event()
+    work = smalti.evolve_many(iter(lambda: waiting.wait() and None, 1), device=cpu)
+    work.close()
+    waiting.set()
+    # Nobody has taken anything.
+    del work
+    smalti.evolve_many(endless(), device=cpu, evals=2_000_000_000)
     # A process that ends in the middle of it ends all the same.
     script = (
         "import numpy, smalti, itertools\n"

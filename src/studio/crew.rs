@@ -12,11 +12,11 @@ use super::make::{PICTURE, made};
 use super::making::finish_on;
 use super::mosaic::Mosaic;
 use super::picture::Picture;
+use super::progress::Caller;
 use super::recipe::Recipe;
 use super::settings::Settings;
 use crate::engine::Crew;
 use crate::error::{Error, Result};
-use crate::evolve::Undisturbed;
 use crate::threads;
 use crate::vk::DeviceKind;
 
@@ -90,7 +90,7 @@ fn side_by_side(
     let goes_on = || !has_ended.load(Ordering::Relaxed);
     // Where `tasks` panicked in another thread, it has nothing more to give.
     let next = || if goes_on() { tasks.lock().ok().and_then(|mut tasks| tasks.next()) } else { None };
-    let make = |task: Result<(Picture, Recipe)>| {
+    let make = |task: Result<(Picture, Recipe)>, goes_on: &mut dyn FnMut() -> bool| {
         task.and_then(|(picture, recipe)| recipe.make(&picture, device, |_| goes_on()))
     };
     std::thread::scope(|scope| {
@@ -99,7 +99,7 @@ fn side_by_side(
             let made_in = made_in.clone();
             let work = move || {
                 while let Some((number, task)) = next() {
-                    let mosaic = rayon::ThreadPool::install(pool, || make(task));
+                    let mosaic = rayon::ThreadPool::install(pool, || make(task, &mut { goes_on }));
                     if made_in.send((number, mosaic)).is_err() {
                         return;
                     }
@@ -109,7 +109,7 @@ fn side_by_side(
         };
         if pools.iter().map_while(start).count() == 0 {
             while let Some((number, task)) = next() {
-                if !done(number, make(task)) || !is_wanted() {
+                if !done(number, make(task, is_wanted)) || !is_wanted() {
                     return;
                 }
             }
@@ -145,6 +145,9 @@ fn as_lanes(
     let mut held = None;
     loop {
         while aboard.len() < lanes_max {
+            if !goes_on() {
+                return Ok(());
+            }
             let next = held.take().or_else(|| tasks.next().map(|(number, task)| (number, Work::new(task))));
             let Some((number, work)) = next else { break };
             let refused = match work {
@@ -163,7 +166,8 @@ fn as_lanes(
                     Ok(false) => Error::Internal("a device without a picture has no room for one".to_owned()),
                     // As for one picture, the CPU stands in for a device that nobody asked for.
                     Err(_) if !device.is_asked_for() => {
-                        if !done(number, made(&work.settings, &work.job, &Device::cpu(), &mut Undisturbed)) {
+                        let mut watched = Caller::new(&work.job, |_| goes_on());
+                        if !done(number, made(&work.settings, &work.job, &Device::cpu(), &mut watched)) {
                             return Ok(());
                         }
                         continue;

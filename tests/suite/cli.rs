@@ -253,6 +253,8 @@ fn stdout_gets_the_format_that_is_asked_for() {
     assert!(drawn.stdout.starts_with(b"<"), "{}", drawn.stderr);
     for (flags, sentence) in [
         ("-o - --format bmp", "--format bmp: there are png, jpg"),
+        ("-o - --format image/png", "--format image/png: there are png, jpg"),
+        ("-o - --format x.png", "--format x.png: there are png, jpg"),
         ("-o b.png --format svg", "--format svg: is for -o -"),
     ] {
         let ran = workshop.run(&format!("evolve photo.png {flags}"));

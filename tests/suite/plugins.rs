@@ -104,7 +104,7 @@ fn what_was_changed_stays_and_other_failures_are_told_in_one_sentence() {
         assert_eq!(std::fs::read_to_string(&changed).unwrap(), "changed");
     }
     let table = plugins(&workshop, "status krita");
-    assert!(String::from_utf8(table.stdout).unwrap().contains("__init__.py was changed"));
+    assert!(String::from_utf8(table.stdout).unwrap().contains("__init__.py is not as smalti put it there"));
     assert_eq!(plugins(&workshop, "remove krita --force").code, Some(0));
     assert_eq!(files(&home), BTreeSet::new());
 }

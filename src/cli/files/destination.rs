@@ -55,7 +55,9 @@ impl Destination {
     pub(crate) fn for_results(paths: &[PathBuf], format: Option<&str>) -> Result<Vec<Self>> {
         let mut found: Vec<Self> = paths.iter().map(|path| Self::for_result(path)).collect::<Result<_>>()?;
         let Some(format) = format else { return Ok(found) };
-        let content = Content::of_path(&Path::new("mosaic").with_extension(format)).ok_or_else(|| {
+        let is_word = format.bytes().all(|byte| byte.is_ascii_alphanumeric());
+        let content = is_word.then(|| Content::of_path(&Path::new("mosaic").with_extension(format))).flatten();
+        let content = content.ok_or_else(|| {
             Error::Usage(if moves(format) {
                 still(&format!("--format {format}"), &format!("mosaic.{format}"))
             } else {
@@ -182,11 +184,11 @@ pub(crate) fn check_writable<'a>(destinations: impl Iterator<Item = &'a Destinat
         }
         if destination.is_stdout() {
             if std::io::stdout().is_terminal() {
-                let sentence = "-o - would write a picture to the terminal; redirect it to a file or a pipe";
+                let sentence = "-o - would write its result to the terminal; redirect it to a file or a pipe";
                 return Err(Error::Usage(sentence.to_owned()));
             }
             if stdout_is_closed() {
-                let reason = "is closed, and -o - would lose the picture; redirect it to a file or a pipe";
+                let reason = "is closed, and -o - would lose its result; redirect it to a file or a pipe";
                 return Err(Error::output(Path::new("stdout"), reason));
             }
         } else {

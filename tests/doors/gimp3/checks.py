@@ -236,14 +236,31 @@ def check_over():
     check("not on a new layer: the layer's pixels are the program's", new == layer and pixels(layer) == expected, said)
     check("and there is no other layer", image.get_layers() == [layer])
     put(layer, before)
-    image.select_rectangle(Gimp.ChannelOps.REPLACE, 10, 20, 40, 30)
-    _, _, expected = program(cut_out(image, layer, (10, 20, 40, 30)), *QUICK_FLAGS, "--style", "mosaic")
+    box = (10, 20, 40, 30)
+    image.select_rectangle(Gimp.ChannelOps.REPLACE, *box)
+    _, _, expected = program(cut_out(image, layer, box), *QUICK_FLAGS, "--style", "mosaic")
     new, said = call(image, [layer], new_layer=False, **QUICK)
-    check("of a selection, too", new and pixels(layer, at=(10, 20, 40, 30)) == expected, said)
+    check("of a selection, too", new and pixels(layer, at=box) == expected, said)
     now, was = bytearray(pixels(layer)), bytearray(before)
     for row in range(20, 50):
         now[4 * (96 * row + 10) : 4 * (96 * row + 50)] = was[4 * (96 * row + 10) : 4 * (96 * row + 50)]
     check("and the rest stays", now == was)
+    put(layer, before)
+    image.select_ellipse(Gimp.ChannelOps.REPLACE, *box)
+    selected = pixels(image.get_selection(), "Y u8", box)
+    for style in ("mosaic", "spray"):
+        put(layer, before)
+        was = pixels(layer, at=box)
+        _, _, made = program(cut_out(image, layer, box), *QUICK_FLAGS, "--style", style)
+        call(image, [layer], new_layer=False, **{**QUICK, "style": style})
+        now = pixels(layer, at=box)
+        worst = 0
+        for at in (4 * pixel for pixel, share in enumerate(selected) if share == 255):
+            alpha = made[at + 3]
+            for channel in range(at, at + 3):
+                wanted = (made[channel] * alpha + was[channel] * (255 - alpha)) / 255
+                worst = max(worst, abs(now[channel] - wanted))
+        check(f"{style} in an ellipse keeps a layer's pixels where it is clear", worst <= 2, worst)
     layer.set_lock_content(True)
     refused("a locked layer", "locked", image, [layer], new_layer=False)
     image.delete()

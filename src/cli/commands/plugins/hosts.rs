@@ -91,7 +91,7 @@ impl Host {
                 vec![runs("smalti/smalti.py", source!("gimp3/smalti.py")), text(("smalti/smalti_program.py", SHARED))]
             }
             Self::Gimp2 => vec![runs(
-                "smalti/smalti",
+                if cfg!(windows) { "smalti/smalti.exe" } else { "smalti/smalti" },
                 &built::for_gimp2(&[
                     ("smalti.c", source!("gimp2/smalti.c")),
                     ("smalti_dialog.h", source!("gimp2/smalti_dialog.h")),

@@ -26,8 +26,9 @@ const LIST_BYTES_MAX: u64 = 1 << 16;
 struct List {
     /// The version of the program that did it.
     version: String,
-    /// The SHA-256 of each file, by its path below the folder of plug-ins.
-    files: BTreeMap<String, String>,
+    /// The SHA-256 of each file, by its path below the folder of plug-ins. While another version is put there, that of
+    /// the old file as well.
+    files: BTreeMap<String, Vec<String>>,
 }
 
 /// How a plug-in is.
@@ -43,6 +44,8 @@ pub(super) enum State {
     Changed(PathBuf),
     /// Something of its name is there that smalti did not put there.
     Foreign(PathBuf),
+    /// It cannot be told, for this reason.
+    Unreadable(String),
 }
 
 /// The plug-in in the folder in which a host looks for plug-ins.
@@ -59,17 +62,18 @@ impl<'a> Kept<'a> {
     }
 
     /// How the plug-in is.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if a file cannot be read.
-    pub fn state(&self) -> Result<State> {
+    pub fn state(&self) -> State {
+        self.state_or_failure().unwrap_or_else(|failure| State::Unreadable(failure.to_string()))
+    }
+
+    fn state_or_failure(&self) -> Result<State> {
         let Some(list) = self.list()? else {
             let is_there = self.own.symlink_metadata().is_ok();
             return Ok(if is_there { State::Foreign(self.own.clone()) } else { State::Absent });
         };
-        for (path, hash) in &list.files {
+        for (path, hashes) in &list.files {
             let path = self.folder.join(path);
-            if read(&path)?.is_none_or(|bytes| hash_of(&bytes) != *hash) {
+            if read(&path)?.is_none_or(|bytes| !hashes.contains(&hash_of(&bytes))) {
                 return Ok(State::Changed(path));
             }
         }
@@ -83,33 +87,36 @@ impl<'a> Kept<'a> {
     /// changed since; then nothing is written.
     pub fn install(&self, files: &[File], others: Others) -> Result<()> {
         let before = self.list()?.unwrap_or_default();
-        if others == Others::Leave {
-            for file in files {
+        for file in files {
+            self.check_is_no_link(&file.path)?;
+            if others == Others::Leave {
                 self.check_replaceable(file, &before)?;
             }
         }
+        // Whatever ends this half-way, the list tells of all that is there.
+        let mut during = List { version: env!("CARGO_PKG_VERSION").to_owned(), ..before.clone() };
+        for file in files {
+            during.files.entry(file.path.clone()).or_default().push(hash_of(&file.bytes));
+        }
+        self.write_list(&during)?;
         for file in files {
             let path = self.folder.join(&file.path);
-            let parent = path.parent().unwrap_or(self.folder);
-            fs::create_dir_all(parent).map_err(|error| {
-                Error::output(parent, format!("the folder cannot be made, since {}", in_words(&error)))
-            })?;
+            make_folder(path.parent().unwrap_or(self.folder))?;
             output::write_atomically(&path, &file.bytes)?;
             if file.is_program {
                 make_program(&path)?;
             }
         }
         let after = List {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            files: files.iter().map(|file| (file.path.clone(), hash_of(&file.bytes))).collect(),
+            files: files.iter().map(|file| (file.path.clone(), vec![hash_of(&file.bytes)])).collect(),
+            ..during
         };
-        let text = serde_json::to_vec_pretty(&after).map_err(|error| Error::Internal(format!("no JSON: {error}")))?;
-        output::write_atomically(&self.list_path(), &text)?;
-        let is_left = |(path, hash): &(&String, &String)| {
+        let is_left = |(path, hashes): &(&String, &Vec<String>)| {
             let bytes = read(&self.folder.join(path)).ok().flatten();
-            !after.files.contains_key(*path) && bytes.is_some_and(|bytes| hash_of(&bytes) == **hash)
+            !after.files.contains_key(*path) && bytes.is_some_and(|bytes| hashes.contains(&hash_of(&bytes)))
         };
-        self.take_away(before.files.iter().filter(is_left).map(|(path, _)| path))
+        self.take_away(before.files.iter().filter(is_left).map(|(path, _)| path))?;
+        self.write_list(&after)
     }
 
     /// Takes the plug-in away; whether there was one.
@@ -119,10 +126,11 @@ impl<'a> Kept<'a> {
     /// removed.
     pub fn remove(&self, others: Others) -> Result<bool> {
         let Some(list) = self.list()? else { return Ok(false) };
-        if others == Others::Leave {
-            for (path, hash) in &list.files {
+        for (path, hashes) in &list.files {
+            self.check_is_no_link(path)?;
+            if others == Others::Leave {
                 let path = self.folder.join(path);
-                if read(&path)?.is_some_and(|bytes| hash_of(&bytes) != *hash) {
+                if read(&path)?.is_some_and(|bytes| !hashes.contains(&hash_of(&bytes))) {
                     let reason = "was changed since smalti put it there; remove it yourself, or with --force";
                     return Err(Error::output(&path, reason));
                 }
@@ -140,11 +148,27 @@ impl<'a> Kept<'a> {
         let Some(bytes) = read(&path)? else { return Ok(()) };
         let hash = hash_of(&bytes);
         match before.files.get(&file.path) {
-            _ if bytes == file.bytes => Ok(()),
-            Some(put) if *put == hash => Ok(()),
+            Some(put) if put.contains(&hash) || bytes == file.bytes => Ok(()),
             Some(_) => Err(Error::output(&path, "was changed since smalti put it there; --force replaces it")),
             None => Err(Error::output(&path, "is there, and smalti did not put it there; --force replaces it")),
         }
+    }
+
+    /// Refuses a path that a link leads out of the folder: what lies behind it is not ours.
+    fn check_is_no_link(&self, path: &str) -> Result<()> {
+        let path = self.folder.join(path);
+        let inside = path.ancestors().take_while(|&part| part != self.folder);
+        let is_link = |part: &&Path| part.symlink_metadata().is_ok_and(|found| found.is_symlink());
+        match inside.into_iter().find(is_link) {
+            Some(link) => Err(Error::output(link, "is a link, which smalti did not make; remove it yourself")),
+            None => Ok(()),
+        }
+    }
+
+    fn write_list(&self, list: &List) -> Result<()> {
+        let text = serde_json::to_vec_pretty(list).map_err(|error| Error::Internal(format!("no JSON: {error}")))?;
+        make_folder(&self.own)?;
+        output::write_atomically(&self.list_path(), &text)
     }
 
     /// Removes files, with what Python compiled of them.
@@ -203,6 +227,11 @@ fn read(path: &Path) -> Result<Option<Vec<u8>>> {
         Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
         Err(error) => Err(Error::input(path, format!("cannot be read, since {}", in_words(&error)))),
     }
+}
+
+fn make_folder(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder)
+        .map_err(|error| Error::output(folder, format!("the folder cannot be made, since {}", in_words(&error))))
 }
 
 fn remove_file(path: &Path) -> Result<()> {
@@ -276,11 +305,11 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let folder = folder.path();
         let kept = Kept::at(folder, NAME);
-        assert_eq!(kept.state().expect("readable"), State::Absent);
+        assert_eq!(kept.state(), State::Absent);
         fs::write(folder.join("other.py"), "not ours").expect("the folder is ours");
         kept.install(&[file("smalti/tool.py", "1"), file("smalti/old.py", "1")], Others::Leave)
             .expect("it is put there");
-        assert_eq!(kept.state().expect("readable"), State::Current);
+        assert_eq!(kept.state(), State::Current);
         kept.install(&[file("smalti/tool.py", "2"), file("smalti.desktop", "2")], Others::Leave)
             .expect("it is replaced");
         let there = ["other.py", "smalti", "smalti.desktop", "smalti/smalti_installed.json", "smalti/tool.py"];
@@ -300,14 +329,14 @@ mod tests {
         let kept = Kept::at(folder, NAME);
         fs::create_dir(folder.join("smalti")).expect("the folder is ours");
         fs::write(folder.join("smalti/tool.py"), "mine").expect("the folder is ours");
-        assert_eq!(kept.state().expect("readable"), State::Foreign(folder.join("smalti")));
+        assert_eq!(kept.state(), State::Foreign(folder.join("smalti")));
         let files = [file("smalti/a.py", "1"), file("smalti/tool.py", "1")];
         let refusal = kept.install(&files, Others::Leave).expect_err("it is not ours").to_string();
         assert!(refusal.ends_with("is there, and smalti did not put it there; --force replaces it"), "{refusal}");
         assert_eq!(all(folder), ["smalti", "smalti/tool.py"], "nothing is half done");
         kept.install(&files, Others::Force).expect("it is forced");
         fs::write(folder.join("smalti/tool.py"), "changed").expect("the folder is ours");
-        assert_eq!(kept.state().expect("readable"), State::Changed(folder.join("smalti/tool.py")));
+        assert_eq!(kept.state(), State::Changed(folder.join("smalti/tool.py")));
         let refusal = kept.remove(Others::Leave).expect_err("it was changed").to_string();
         assert!(refusal.contains("tool.py: was changed since"), "{refusal}");
         assert_eq!(fs::read(folder.join("smalti/tool.py")).expect("it stays"), b"changed");
@@ -324,13 +353,53 @@ mod tests {
             fs::create_dir_all(folder.join("smalti")).expect("the folder is ours");
             fs::write(folder.join("smalti").join(LIST), text).expect("the folder is ours");
         };
+        write("{}");
+        assert!(matches!(kept.state(), State::Unreadable(sentence) if sentence.contains("is not the list")));
         write(r#"{"version": "0.0.1", "files": {}}"#);
-        assert_eq!(kept.state().expect("readable"), State::Other("0.0.1".to_owned()));
+        assert_eq!(kept.state(), State::Other("0.0.1".to_owned()));
         for path in ["../victim", "/victim", "smalti/../../victim", "other/file", ""] {
-            write(&format!(r#"{{"version": "0.0.1", "files": {{"{path}": "00"}}}}"#));
+            write(&format!(r#"{{"version": "0.0.1", "files": {{"{path}": ["00"]}}}}"#));
             let refusal = kept.remove(Others::Force).expect_err(path).to_string();
             assert!(refusal.contains("is not the list that smalti wrote"), "{refusal}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_or_removed_through_a_link() {
+        let both = tempfile::tempdir().expect("a temporary folder");
+        let [folder, source] = ["plug-ins", "source"].map(|name| both.path().join(name));
+        for folder in [&folder, &source] {
+            fs::create_dir(folder).expect("the folder is ours");
+        }
+        std::os::unix::fs::symlink(&source, folder.join("smalti")).expect("the folder is ours");
+        fs::write(source.join("tool.py"), "1").expect("the folder is ours");
+        let kept = Kept::at(&folder, NAME);
+        for others in [Others::Leave, Others::Force] {
+            let refusal = kept.install(&[file("smalti/tool.py", "1")], others).expect_err("it is a link").to_string();
+            assert!(refusal.contains("is a link, which smalti did not make"), "{refusal}");
+        }
+        fs::write(source.join(LIST), r#"{"version": "0.0.1", "files": {"smalti/tool.py": ["00"]}}"#).expect("ours");
+        assert!(kept.remove(Others::Force).is_err());
+        assert_eq!(all(&source), [LIST, "tool.py"]);
+    }
+
+    #[test]
+    fn what_is_half_installed_can_be_installed_and_removed() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let folder = folder.path();
+        let kept = Kept::at(folder, NAME);
+        kept.install(&[file("smalti/a.py", "1"), file("smalti/b.py", "1")], Others::Leave).expect("it is put there");
+        // A folder where a file should be ends the next one half-way.
+        fs::create_dir(folder.join("smalti/c.py")).expect("the folder is ours");
+        let next = [file("smalti/a.py", "2"), file("smalti/c.py", "2"), file("smalti/b.py", "2")];
+        assert!(kept.install(&next, Others::Force).is_err());
+        assert_eq!(fs::read(folder.join("smalti/a.py")).expect("it is there"), b"2");
+        fs::remove_dir(folder.join("smalti/c.py")).expect("the folder is ours");
+        kept.install(&next, Others::Leave).expect("the same again");
+        assert_eq!(kept.state(), State::Current);
+        assert!(kept.remove(Others::Leave).expect("it can be removed"));
+        assert_eq!(all(folder), [""; 0]);
     }
 
     #[cfg(unix)]

@@ -19,7 +19,7 @@ use crate::cli::terminal;
 use crate::error::{Error, Result};
 
 const AFTER_HELP: &str = "\
-Without HOST all of them are meant that are found on this machine.
+Without HOST, install takes every program that it finds, and remove and status take all.
 
 Examples:
   smalti plugins status
@@ -41,19 +41,32 @@ enum Work {
     ///
     /// What is there of another version is replaced. A file that smalti did not put there, or that was changed since,
     /// is refused.
-    Install(ChangeArgs),
+    Install(InstallArgs),
     /// Take away what `smalti plugins install` put there, and nothing else
-    Remove(ChangeArgs),
+    Remove(RemoveArgs),
     /// Tell which programs are found, and which plug-ins they have
     Status(StatusArgs),
 }
 
 #[derive(Debug, Args)]
-struct ChangeArgs {
+struct InstallArgs {
     /// Program to put it into; repeat it for more
     #[arg(value_enum, value_name = "HOST")]
     hosts: Vec<Host>,
-    /// Also replace or remove files that were changed since, or that smalti did not put there
+    /// Also replace files that were changed since, or that smalti did not put there
+    #[arg(long)]
+    force: bool,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+#[derive(Debug, Args)]
+struct RemoveArgs {
+    /// Program to take it from; repeat it for more
+    #[arg(value_enum, value_name = "HOST")]
+    hosts: Vec<Host>,
+    /// Also remove files that were changed since smalti put them there
     #[arg(long)]
     force: bool,
     /// Say nothing but errors
@@ -81,22 +94,24 @@ enum Others {
 /// Does the work; returns the exit code of the process.
 pub(crate) fn plugins(args: &PluginsArgs) -> ExitCode {
     let around = Surroundings::of_this_process();
-    terminal::exit_code(match &args.work {
-        Work::Install(change) => install(change, &around),
-        Work::Remove(change) => remove(change, &around),
-        Work::Status(status) => tell(status, &around),
-    })
+    let failures = match &args.work {
+        Work::Install(args) => install(args, &around),
+        Work::Remove(args) => remove(args, &around),
+        Work::Status(args) => tell(args, &around).err().into_iter().collect(),
+    };
+    // A failure in one place stops none of the others, so there may be several.
+    failures.into_iter().fold(ExitCode::SUCCESS, |_, failure| terminal::exit_code(Err(failure)))
 }
 
-impl ChangeArgs {
-    fn others(&self) -> Others {
-        if self.force { Others::Force } else { Others::Leave }
+impl Others {
+    fn of_flag(is_forced: bool) -> Self {
+        if is_forced { Self::Force } else { Self::Leave }
     }
+}
 
-    fn say(&self, line: &str) {
-        if !self.quiet {
-            terminal::say(&format!("smalti: {line}"));
-        }
+fn say(is_quiet: bool, line: &str) {
+    if !is_quiet {
+        terminal::say(&format!("smalti: {line}"));
     }
 }
 
@@ -107,7 +122,7 @@ fn chosen(named: &[Host]) -> Vec<Host> {
 }
 
 /// Where to install: every place of a host that is found, and of one that was named the usual place at least.
-fn targets(args: &ChangeArgs, around: &Surroundings) -> Vec<(Host, Place)> {
+fn targets(args: &InstallArgs, around: &Surroundings) -> Vec<(Host, Place)> {
     let mut targets = Vec::new();
     for host in chosen(&args.hosts) {
         let mut places = around.places(host);
@@ -123,7 +138,8 @@ fn targets(args: &ChangeArgs, around: &Surroundings) -> Vec<(Host, Place)> {
     targets
 }
 
-fn install(args: &ChangeArgs, around: &Surroundings) -> Result<()> {
+/// Installs all that is asked for; what failed.
+fn install(args: &InstallArgs, around: &Surroundings) -> Vec<Error> {
     let targets = targets(args, around);
     if targets.is_empty() {
         let reason = if around.has_home() {
@@ -131,50 +147,51 @@ fn install(args: &ChangeArgs, around: &Surroundings) -> Result<()> {
         } else {
             "this user has no home folder; set HOME to one"
         };
-        return Err(Error::Usage(reason.to_owned()));
+        return vec![Error::Usage(reason.to_owned())];
     }
-    let mut first = Ok(());
+    let mut failures = Vec::new();
     for (host, place) in targets {
-        let done = host
-            .files(around.program.as_deref())
-            .and_then(|files| Kept::at(&place.folder, host.own_folder()).install(&files, args.others()));
-        match done {
+        let kept = Kept::at(&place.folder, host.own_folder());
+        let files = host.files(around.program.as_deref());
+        match files.and_then(|files| kept.install(&files, Others::of_flag(args.force))) {
             Ok(()) => {
-                args.say(&format!("{}: its plug-in is in {}; {}", host.title(), place.folder.display(), host.next()));
+                let folder = place.folder.display();
+                say(args.quiet, &format!("{}: its plug-in is in {folder}; {}", host.title(), host.next()));
             }
-            // The others get theirs all the same.
-            Err(error) => first = first.and(Err(error)),
+            Err(failure) => failures.push(failure),
         }
     }
-    first
+    failures
 }
 
-fn remove(args: &ChangeArgs, around: &Surroundings) -> Result<()> {
-    let mut first = Ok(());
+/// Removes all that is asked for; what failed.
+fn remove(args: &RemoveArgs, around: &Surroundings) -> Vec<Error> {
+    let mut failures = Vec::new();
     let mut count = 0;
     for host in chosen(&args.hosts) {
         for place in around.places(host) {
-            match Kept::at(&place.folder, host.own_folder()).remove(args.others()) {
+            match Kept::at(&place.folder, host.own_folder()).remove(Others::of_flag(args.force)) {
                 Ok(false) => {}
                 Ok(true) => {
                     count += 1;
-                    args.say(&format!("{}: its plug-in is gone from {}", host.title(), place.folder.display()));
+                    let folder = place.folder.display();
+                    say(args.quiet, &format!("{}: its plug-in is gone from {folder}", host.title()));
                 }
-                Err(error) => first = first.and(Err(error)),
+                Err(failure) => failures.push(failure),
             }
         }
     }
-    if count == 0 && first.is_ok() {
-        args.say("no plug-in of smalti is there");
+    if count == 0 && failures.is_empty() {
+        say(args.quiet, "no plug-in of smalti is there");
     }
-    first
+    failures
 }
 
 fn tell(args: &StatusArgs, around: &Surroundings) -> Result<()> {
     let mut rows = Vec::new();
     for host in chosen(&args.hosts) {
         for (number, place) in around.places(host).into_iter().enumerate() {
-            let state = Kept::at(&place.folder, host.own_folder()).state()?;
+            let state = Kept::at(&place.folder, host.own_folder()).state();
             // Where there is neither a host nor a plug-in, one line says so.
             if number == 0 || place.is_found || state != State::Absent {
                 rows.push((host, place, state));
@@ -199,6 +216,7 @@ fn row(host: Host, place: &Place, state: &State) -> Value {
         State::Other(version) => ("other-version", Some(version.as_str())),
         State::Changed(_) => ("changed", None),
         State::Foreign(_) => ("foreign", None),
+        State::Unreadable(_) => ("unreadable", None),
     };
     json!({
         "host": host.name(), "way": place.way(), "found": place.is_found, "folder": place.folder, "state": word,
@@ -217,7 +235,10 @@ fn line(host: Host, place: &Place, state: &State) -> String {
             "plug-in of version {version} in {folder}, and this is {}; smalti plugins install {name} replaces it",
             env!("CARGO_PKG_VERSION")
         ),
-        State::Changed(path) => format!("plug-in in {folder}, of which {} was changed", path.display()),
+        State::Changed(path) => {
+            format!("plug-in in {folder}, of which {} is not as smalti put it there", path.display())
+        }
+        State::Unreadable(sentence) => sentence.clone(),
         State::Foreign(path) => format!("{} is there, and smalti did not put it there", path.display()),
     }
 }

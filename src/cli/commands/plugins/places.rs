@@ -16,6 +16,8 @@ pub(super) struct Surroundings {
     /// Folders of programs.
     path: Vec<PathBuf>,
     system: System,
+    /// Where Flatpaks of all users lie.
+    flatpaks: PathBuf,
     /// The program that is running, if its path is text.
     pub program: Option<String>,
 }
@@ -65,6 +67,8 @@ struct Names {
     variable: Option<&'static str>,
     /// Programs that only it brings.
     programs: &'static [&'static str],
+    /// Whether its folder alone does not show that it is there: an upgrade leaves it behind.
+    needs_program: bool,
     flatpak: Option<&'static str>,
     snap: Option<&'static str>,
     /// Whether it lies with the user's data and not with the settings, where these differ.
@@ -79,6 +83,7 @@ impl Host {
                 plugins: "plug-ins",
                 variable: Some("GIMP3_DIRECTORY"),
                 programs: &["gimp-3.0", "gimp-3"],
+                needs_program: false,
                 flatpak: Some("org.gimp.GIMP"),
                 snap: Some("gimp"),
                 is_data: false,
@@ -89,6 +94,7 @@ impl Host {
                 plugins: "plug-ins",
                 variable: Some("GIMP2_DIRECTORY"),
                 programs: &["gimp-2.10"],
+                needs_program: true,
                 flatpak: None,
                 snap: None,
                 is_data: false,
@@ -98,6 +104,7 @@ impl Host {
                 plugins: "",
                 variable: None,
                 programs: &["krita"],
+                needs_program: false,
                 flatpak: Some("org.kde.krita"),
                 snap: Some("krita"),
                 is_data: true,
@@ -107,6 +114,7 @@ impl Host {
                 plugins: "extensions",
                 variable: Some("INKSCAPE_PROFILE_DIR"),
                 programs: &["inkscape"],
+                needs_program: false,
                 flatpak: Some("org.inkscape.Inkscape"),
                 snap: Some("inkscape"),
                 is_data: false,
@@ -130,6 +138,7 @@ impl Surroundings {
             variable: Box::new(|name| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute())),
             path: env::var_os("PATH").map(|path| env::split_paths(&path).collect()).unwrap_or_default(),
             system,
+            flatpaks: PathBuf::from("/var/lib/flatpak/app"),
             program,
         }
     }
@@ -142,12 +151,16 @@ impl Surroundings {
     pub fn places(&self, host: Host) -> Vec<Place> {
         let names = host.names();
         let has_program = names.programs.iter().any(|name| self.has_program(name));
-        let mut places: Vec<Place> = self
-            .by_itself(&names)
-            .iter()
-            .flat_map(|folder| of_versions(folder))
+        let named = names.variable.and_then(|name| (self.variable)(name));
+        let folders = match (named, self.by_itself(&names)) {
+            (Some(named), _) => vec![named],
+            (None, Some(usual)) => of_versions(&usual),
+            (None, None) => Vec::new(),
+        };
+        let mut places: Vec<Place> = folders
+            .into_iter()
             .map(|folder| {
-                let is_found = has_program || folder.is_dir();
+                let is_found = has_program || !names.needs_program && folder.is_dir();
                 Place { folder: below(&folder, names.plugins), way: Way::ByItself, is_found }
             })
             .collect();
@@ -155,7 +168,7 @@ impl Surroundings {
         let relative = names.folders[0];
         if let Some(name) = names.flatpak {
             let app = home.join(".var/app").join(name);
-            let is_found = app.is_dir() || Path::new("/var/lib/flatpak/app").join(name).is_dir();
+            let is_found = app.is_dir() || self.flatpaks.join(name).is_dir();
             let base = app.join(if names.is_data { "data" } else { "config" }).join(relative);
             places.extend(of_versions(&base).into_iter().map(|folder| Place {
                 folder: below(&folder, names.plugins),
@@ -177,9 +190,6 @@ impl Surroundings {
 
     /// The folder of a host that is installed by itself.
     fn by_itself(&self, names: &Names) -> Option<PathBuf> {
-        if let Some(folder) = names.variable.and_then(|name| (self.variable)(name)) {
-            return Some(folder);
-        }
         let home = |below: &str| self.home.as_ref().map(|home| home.join(below));
         let (base, relative) = match (self.system, names.is_data) {
             (System::Windows, _) => ((self.variable)("APPDATA"), names.folders[2]),
@@ -228,8 +238,8 @@ mod tests {
     fn around(home: &Path, system: System) -> Surroundings {
         let roaming = home.join("Roaming");
         let variable = move |name: &str| (name == "APPDATA").then(|| roaming.clone());
-        let home = Some(home.to_owned());
-        Surroundings { home, variable: Box::new(variable), path: Vec::new(), system, program: None }
+        let (flatpaks, home) = (home.join("flatpaks"), Some(home.to_owned()));
+        Surroundings { home, variable: Box::new(variable), path: Vec::new(), system, flatpaks, program: None }
     }
 
     fn folders(around: &Surroundings, host: Host) -> Vec<String> {
@@ -288,11 +298,14 @@ mod tests {
         }
         let plugins = |version: &str| home.path().join(".config/GIMP").join(version).join("plug-ins");
         assert_eq!(found(&around, Host::Gimp3), [plugins("3.0"), plugins("3.2")]);
-        assert_eq!(found(&around, Host::Gimp2), [plugins("2.10")]);
+        assert_eq!(found(&around, Host::Gimp2), Vec::<PathBuf>::new(), "GIMP 3 leaves that folder when it takes over");
         assert_eq!(found(&around, Host::Krita), [home.path().join(".var/app/org.kde.krita/data/krita")]);
         assert_eq!(found(&around, Host::Inkscape), Vec::<PathBuf>::new());
-        std::fs::write(home.path().join("bin/inkscape"), "").expect("the folder is ours");
+        for program in ["bin/inkscape", "bin/gimp-2.10"] {
+            std::fs::write(home.path().join(program), "").expect("the folder is ours");
+        }
         around.path.push(home.path().join("bin"));
         assert_eq!(found(&around, Host::Inkscape), [home.path().join(".config/inkscape/extensions")]);
+        assert_eq!(found(&around, Host::Gimp2), [plugins("2.10")]);
     }
 }
