@@ -46,7 +46,7 @@ pub(super) fn save(
         }
         wrote += &format!(", {}", super::name_of(&steps));
     }
-    Ok(format!("Wrote {wrote}. It is made again by: {}", command(script, is_at_end, input.as_deref(), Some(save))))
+    Ok(format!("Saved {wrote}.\nTo make it again: {}", command(script, is_at_end, input.as_deref(), Some(save))))
 }
 
 /// Whether flags alone ask for the same mosaic: it was not steered, nor ended by hand.

@@ -272,7 +272,7 @@ impl<'d> Worker<'d> {
         let Some(open) = &self.open else {
             self.wishes = wishes;
             if self.shown.is_some() {
-                let hint = "These are saved tiles; open a picture, and it is made by these wishes";
+                let hint = "These are saved tiles; open a picture, and it is made with these settings";
                 self.desk.tell(|news| news.notes.push(Note::hint(hint)));
             }
             return Ok(());
@@ -302,7 +302,7 @@ impl<'d> Worker<'d> {
         }
         if was_at_work {
             // Another number of tiles, another size, or tiles that show through: that needs a new beginning.
-            let hint = "That cannot be changed half-way, so the picture began anew";
+            let hint = "The picture begins again, as this change needs";
             self.desk.tell(|news| news.notes.push(Note::hint(hint)));
         }
         Ok(())

@@ -110,10 +110,15 @@ fn what_was_changed_stays_and_other_failures_are_told_in_one_sentence() {
 }
 
 #[test]
-fn what_the_python_hosts_share_is_of_this_version_and_does_what_it_says() {
+fn what_finds_the_program_is_of_this_version_and_does_what_it_says() {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("plugins/shared");
     let text = std::fs::read_to_string(shared.join("smalti_program.py")).unwrap();
     assert!(text.contains(&format!("\nVERSION = \"{}\"\n", env!("CARGO_PKG_VERSION"))), "another version");
+    let of_gimp2 = std::fs::read_to_string(shared.join("../gimp2/smalti_program.h")).unwrap();
+    assert!(
+        of_gimp2.contains(&format!("\n#define SMALTI_VERSION \"{}\"\n", env!("CARGO_PKG_VERSION"))),
+        "another version"
+    );
     let mut command = Command::new("python3");
     command.args(["-m", "unittest", "-q", "test_smalti_program"]).env("SMALTI", env!("CARGO_BIN_EXE_smalti"));
     command.env("PYTHONDONTWRITEBYTECODE", "1").env("SMALTI_DEVICE", "cpu");

@@ -70,7 +70,7 @@ impl Interface {
             self.orders.push(Order::Step);
         }
         let can_restart = matches!(doing, Doing::Running | Doing::Paused | Doing::Done(_));
-        if button(ui, can_restart, "Restart", "Begin anew with these wishes (Ctrl+R)") {
+        if button(ui, can_restart, "Restart", "Begin again from nothing, with these settings (Ctrl+R)") {
             self.restart();
         }
     }
@@ -89,8 +89,13 @@ impl Interface {
         if self.has_dialogs {
             self.requests.push(Request::Open);
         } else {
-            self.wants_open_field = true;
+            self.begin_typing();
         }
+    }
+
+    /// Shows the field for a path, with the cursor in it.
+    pub(super) fn begin_typing(&mut self) {
+        (self.wants_open_field, self.wants_cursor) = (true, true);
     }
 
     fn one_to_one(&mut self) {
@@ -115,7 +120,8 @@ impl Interface {
         if save && self.news.tiles.is_some() {
             self.save.is_open = true;
         }
-        if ctx.text_edit_focused() {
+        // Without a picture they would arm what nobody sees.
+        if ctx.text_edit_focused() || self.tiles().is_none() {
             return;
         }
         // The longer one first, which has the shorter one in it.

@@ -80,11 +80,15 @@ fn dab(map: &mut WeightMap, centre: Pos2, radius: f32, luma: u8) {
 
 impl Interface {
     pub(super) fn show_brush(&mut self, ui: &mut Ui) {
-        ui.weak("Paint over faces first: errors there count up to 16 times.");
+        ui.weak("Paint over what should come closest, such as faces. Restart uses the map from the beginning.");
         ui.horizontal(|ui| {
-            ui.toggle_value(&mut self.brush.is_on, "Paint").on_hover_text("Paint on the picture (B)");
-            ui.selectable_value(&mut self.brush.erases, false, "more").on_hover_text("What matters");
-            ui.selectable_value(&mut self.brush.erases, true, "less").on_hover_text("What does not matter");
+            ui.toggle_value(&mut self.brush.is_on, "Brush").on_hover_text("Paint on the picture (B)");
+            for (erases, name, hint) in [(false, "more", "What matters"), (true, "less", "What does not matter")] {
+                let is_chosen = self.brush.is_on && self.brush.erases == erases;
+                if ui.selectable_label(is_chosen, name).on_hover_text(hint).clicked() {
+                    (self.brush.is_on, self.brush.erases) = (true, erases);
+                }
+            }
         });
         ui.add(Slider::new(&mut self.brush.radius, 1.0..=300.0).logarithmic(true).suffix(" px").text("brush"));
         let has_map = self.wishes.weight.is_some();

@@ -15,6 +15,8 @@ use crate::view::wishes::{ColorWish, GroundWish, GroutWish, StyleWish, UsualBoun
 
 /// Most px of the longer side at which a picture evolves here.
 const SIZE_MAX: u64 = 4_096;
+/// Tiles of a picture of 512x512 px, before there is one.
+const USUAL_TILES: u64 = 5_000;
 
 impl Interface {
     pub(super) fn show_controls(&mut self, ui: &mut Ui) {
@@ -26,10 +28,10 @@ impl Interface {
             section(ui, "Grout and ground", true, |ui| show_grout(ui, &mut self.wishes));
             section(ui, "Colours", false, |ui| self.show_colors(ui));
             section(ui, "What matters", true, |ui| self.show_brush(ui));
-            section(ui, "Bounds of the style", false, |ui| show_bounds(ui, &mut self.wishes));
+            section(ui, "Limits", false, |ui| show_bounds(ui, &mut self.wishes));
             section(ui, "Search", false, |ui| show_search(ui, &mut self.wishes));
             ui.add_space(8.0);
-            if ui.button("As at first").on_hover_text("Put all wishes back").clicked() {
+            if ui.button("Reset all").on_hover_text("Put all settings back").clicked() {
                 self.wishes = Wishes::default();
                 self.brush.forget();
             }
@@ -66,8 +68,8 @@ impl Interface {
     }
 
     fn show_tiles(&mut self, ui: &mut Ui) {
-        let present = self.news.standing.tile_count.max(1) as u64;
-        let usual = self.news.tiles.as_ref().map_or(present, |tiles| tiles.flies.len() as u64);
+        let present = self.news.tiles.as_ref().map(|tiles| tiles.flies.len()).or(Some(self.news.standing.tile_count));
+        let usual = present.filter(|&count| count > 0).map_or(USUAL_TILES, |count| count as u64);
         let mut tiles = self.wishes.tiles.unwrap_or(usual);
         let slider = Slider::new(&mut tiles, 1..=FLY_COUNT_MAX as u64)
             .logarithmic(true)
@@ -80,7 +82,7 @@ impl Interface {
         }
         let mut is_usual = self.wishes.tiles.is_none();
         let hint = "As many tiles as suit the size of the picture";
-        if ui.checkbox(&mut is_usual, "as suits the picture").on_hover_text(hint).changed() {
+        if ui.checkbox(&mut is_usual, "automatic number").on_hover_text(hint).changed() {
             self.wishes.tiles = (!is_usual).then_some(tiles);
         }
         ui.add_space(4.0);
@@ -151,14 +153,14 @@ fn show_swatches(ui: &mut Ui, colors: &[Rgb]) {
 fn show_grout(ui: &mut Ui, wishes: &mut Wishes) {
     let mut color = if let GroutWish::Color(color) = wishes.grout { color } else { [64, 58, 52] };
     let chosen = match wishes.grout {
-        GroutWish::OfStyle => "as the style has it",
+        GroutWish::OfStyle => "default of the style",
         GroutWish::None => "none",
         GroutWish::Auto => "a darker mean",
         GroutWish::Color(_) => "this colour",
     };
     ui.horizontal(|ui| {
         ComboBox::from_label("grout").selected_text(chosen).show_ui(ui, |ui| {
-            ui.selectable_value(&mut wishes.grout, GroutWish::OfStyle, "as the style has it");
+            ui.selectable_value(&mut wishes.grout, GroutWish::OfStyle, "default of the style");
             ui.selectable_value(&mut wishes.grout, GroutWish::None, "none");
             ui.selectable_value(&mut wishes.grout, GroutWish::Auto, "a darker mean");
             let is_color = matches!(wishes.grout, GroutWish::Color(_));
@@ -181,13 +183,13 @@ fn show_grout(ui: &mut Ui, wishes: &mut Wishes) {
     }
     let mut ground = if let GroundWish::Color(color) = wishes.ground { color } else { [0; 3] };
     let chosen = match wishes.ground {
-        GroundWish::OfStyle => "as the style has it",
+        GroundWish::OfStyle => "default of the style",
         GroundWish::None => "none: transparent",
         GroundWish::Color(_) => "this colour",
     };
     ui.horizontal(|ui| {
         ComboBox::from_label("background").selected_text(chosen).show_ui(ui, |ui| {
-            ui.selectable_value(&mut wishes.ground, GroundWish::OfStyle, "as the style has it");
+            ui.selectable_value(&mut wishes.ground, GroundWish::OfStyle, "default of the style");
             ui.selectable_value(&mut wishes.ground, GroundWish::None, "none: transparent");
             let is_color = matches!(wishes.ground, GroundWish::Color(_));
             if ui.selectable_label(is_color, "this colour").clicked() {
@@ -264,9 +266,9 @@ fn optional<T: Copy>(
 
 impl Interface {
     pub(super) fn show_shaders(&mut self, ui: &mut Ui) {
-        let chosen = self.wishes.shader.map_or("as the style has it", Shader::name);
+        let chosen = self.wishes.shader.map_or("default of the style", Shader::name);
         ComboBox::from_label("shader").selected_text(chosen).show_ui(ui, |ui| {
-            ui.selectable_value(&mut self.wishes.shader, None, "as the style has it");
+            ui.selectable_value(&mut self.wishes.shader, None, "default of the style");
             for shader in Shader::ALL {
                 let label = ui.selectable_label(self.wishes.shader == Some(shader), shader.name());
                 if label.on_hover_text(shader.description()).clicked() {

@@ -113,8 +113,14 @@ impl Interface {
     /// The field for what is to be opened.
     pub(super) fn show_open_field(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            let edit = TextEdit::singleline(&mut self.open_path).hint_text("path of a picture, a .npz or a folder");
+            let edit = TextEdit::singleline(&mut self.open_path).hint_text("type the path of a picture here");
             let response = ui.add(edit.desired_width(280.0));
+            if std::mem::take(&mut self.wants_cursor) {
+                response.request_focus();
+            }
+            // In the middle of an empty window it would be taken for a caption.
+            let edge = egui::Stroke::new(1.0, ui.visuals().weak_text_color());
+            ui.painter().rect_stroke(response.rect.expand(1.0), 4.0, edge, egui::StrokeKind::Outside);
             response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::TextEdit, true, "path to open"));
             let is_entered = response.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
             if (ui.button("Open").clicked() || is_entered) && !self.open_path.trim().is_empty() {
@@ -134,7 +140,7 @@ impl Interface {
         egui::Window::new("Open").open(&mut is_open).collapsible(false).resizable(false).show(ui.ctx(), |ui| {
             self.show_open_field(ui);
         });
-        self.wants_open_field &= is_open;
+        self.wants_open_field &= is_open && !ui.input(|input| input.key_pressed(Key::Escape));
     }
 }
 

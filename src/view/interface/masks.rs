@@ -91,7 +91,7 @@ impl Interface {
             self.wishes.masks.remove(place);
         }
         if self.wishes.masks.is_empty() {
-            ui.weak("None chosen: as the style has it. Several make a mix.");
+            ui.weak("None chosen: the default of the style. Several make a mix.");
         }
         let hint = "A picture or an SVG of a tile: what is opaque in it is the tile";
         if let Some(Taken { path, .. }) = self.show_path(ui, Field::Mask, hint) {

@@ -25,6 +25,10 @@ impl Messages {
         self.notes.drain(..surplus);
     }
 
+    pub(super) fn forget_failures(&mut self) {
+        self.notes.retain(|(note, _)| note.kind != NoteKind::Failure);
+    }
+
     pub(super) fn show(&mut self, ui: &Ui) {
         let now = ui.input(|input| input.time);
         self.notes.retain(|(note, since)| note.kind == NoteKind::Failure || now - since < STAY_S);
@@ -44,7 +48,11 @@ impl Messages {
                     ui.horizontal_top(|ui| {
                         ui.vertical(|ui| {
                             ui.set_width(340.0);
-                            ui.label(RichText::new(sentence(&note.text)));
+                            let (text, command) = note.text.split_once('\n').unwrap_or((&note.text, ""));
+                            ui.label(RichText::new(sentence(text)));
+                            if !command.is_empty() {
+                                ui.weak(RichText::new(command).small());
+                            }
                         });
                         if ui.small_button("×").on_hover_text("Close this message").clicked() {
                             closed = Some(place);

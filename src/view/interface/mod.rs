@@ -69,6 +69,8 @@ pub(super) struct Interface {
     open_path: String,
     /// Whether the field for a path is shown while something is open.
     wants_open_field: bool,
+    /// Whether the cursor is to go into that field.
+    wants_cursor: bool,
     fields: Fields,
     save: SaveForm,
     messages: Messages,
@@ -103,6 +105,7 @@ impl Interface {
             brush: Brush::default(),
             open_path: String::new(),
             wants_open_field: false,
+            wants_cursor: false,
             fields: Fields::default(),
             save: SaveForm::default(),
             messages: Messages::default(),
@@ -126,6 +129,8 @@ impl Interface {
             self.camera = Camera::FITTED;
             self.moment = None;
             self.brush.forget();
+            // What could not be opened before this one matters no more.
+            self.messages.forget_failures();
             // What was painted belongs to the picture that it was painted on.
             self.history.drop_weights();
             (self.wishes.weight, self.asked.weight) = (None, None);
@@ -202,7 +207,7 @@ impl Interface {
     pub(super) fn without_dialogs(&mut self, request: &Request) {
         self.has_dialogs = false;
         match request {
-            Request::Open => self.wants_open_field = true,
+            Request::Open => self.begin_typing(),
             // Its form has a field.
             Request::Save(_) => {}
             Request::Field(field) => self.fields.open(*field),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use egui::{ComboBox, Key, Slider, TextEdit, Ui};
 
+use super::course::grouped;
 use super::files::typed;
 use super::{Interface, Request};
 use crate::model::target::TARGET_SIDE_MAX_PX;
@@ -21,6 +22,9 @@ const FORMATS: [(&str, &str); 8] = [
     ("csv", "a table of the tiles"),
     ("json", "the tiles for programs"),
 ];
+
+/// Longer sides that are often asked for, in px.
+const USUAL_SIDES: [u32; 2] = [2_048, 4_096];
 
 /// The content of a file with this ending.
 fn content_of(format: &str) -> Option<Content> {
@@ -123,14 +127,18 @@ impl Interface {
 
     fn show_save_size(&mut self, ui: &mut Ui) {
         let evolved = self.tiles().map_or(512, |tiles| tiles.width_px.max(tiles.height_px));
-        let mut is_larger = self.save.long_side_px.is_some();
-        if ui.checkbox(&mut is_larger, format!("another size than {evolved} px")).changed() {
-            self.save.long_side_px = is_larger.then_some(4_096);
-        }
-        if let Some(px) = &mut self.save.long_side_px {
-            let slider = Slider::new(px, 16..=TARGET_SIDE_MAX_PX).logarithmic(true).suffix(" px").text("longer side");
+        let mut px = self.save.long_side_px.unwrap_or(evolved);
+        ui.horizontal(|ui| {
+            let slider =
+                Slider::new(&mut px, 16..=TARGET_SIDE_MAX_PX).logarithmic(true).suffix(" px").text("longer side");
             ui.add(slider).on_hover_text("Tiles are drawn anew, so that they are sharp at any size");
-        }
+            for usual in USUAL_SIDES {
+                if ui.small_button(grouped(u64::from(usual))).on_hover_text("px").clicked() {
+                    px = usual;
+                }
+            }
+        });
+        self.save.long_side_px = (px != evolved).then_some(px);
     }
 
     fn show_save_button(&mut self, ui: &mut Ui) {

@@ -85,8 +85,10 @@ fn orders(window: &mut Window) -> Vec<Order> {
 fn before_a_picture_is_open_the_stage_asks_for_one_and_takes_a_path() {
     let mut window = window_of(News::default());
     window.get_by_label("Drop a picture here");
-    window.get_by_label("path to open").focus();
-    window.run();
+    press(&mut window, Key::B);
+    assert!(!window.state().brush.is_on, "nothing is armed that nobody sees");
+    click(&mut window, "Open…");
+    assert!(window.get_by_label("path to open").is_focused(), "the cursor is where one types");
     window.get_by_label("path to open").type_text("photos/a b.png");
     window.run();
     click(&mut window, "Open");
@@ -100,10 +102,7 @@ fn every_style_can_be_chosen_and_takes_nothing_of_another_along() {
     window.run();
     assert_eq!(asked(&mut window).map(|wishes| wishes.masks.len()), Some(1));
     for (name, style) in [("Paint", StyleWish::Paint), ("Free", StyleWish::Free), ("Spray", StyleWish::Spray)] {
-        // The brush has a button of the same name, further down.
-        let label = window.get_all_by_label(name).next().expect("there is one");
-        label.click();
-        window.run();
+        click(&mut window, name);
         let wishes = asked(&mut window).expect("the wishes changed");
         assert_eq!((wishes.style, wishes.masks.len()), (style, 0));
     }
@@ -119,7 +118,7 @@ fn the_number_of_tiles_is_typed_or_left_to_the_picture() {
     press(&mut window, Key::ArrowRight);
     let tiles = asked(&mut window).expect("it changed").tiles.expect("it is a number");
     assert!(tiles > 2_500, "{tiles}");
-    click(&mut window, "as suits the picture");
+    click(&mut window, "automatic number");
     assert_eq!(asked(&mut window).expect("it changed").tiles, None);
 }
 
@@ -160,8 +159,7 @@ fn grout_and_background_have_all_their_kinds() {
 fn colours_bounds_and_search_are_behind_their_titles() {
     let mut window = window();
     // What is open already is closed, so that the others are on the screen.
-    for title in ["Shape of the tiles", "Grout and ground", "What matters", "Colours", "Bounds of the style", "Search"]
-    {
+    for title in ["Shape of the tiles", "Grout and ground", "What matters", "Colours", "Limits", "Search"] {
         click(&mut window, title);
     }
     window.run_steps(30);
@@ -181,7 +179,7 @@ fn colours_bounds_and_search_are_behind_their_titles() {
     }
     let wishes = asked(&mut window).expect("they changed");
     assert!(wishes.size > 512 && wishes.evals_per_tile > 400, "{wishes:?}");
-    click(&mut window, "As at first");
+    click(&mut window, "Reset all");
     assert_eq!(asked(&mut window), Some(Wishes::default()));
 }
 
@@ -311,7 +309,7 @@ fn the_slider_goes_back_in_time_and_returns() {
 #[test]
 fn what_is_painted_becomes_a_map_once_the_brush_is_lifted() {
     let mut window = window();
-    press(&mut window, Key::B);
+    click(&mut window, "more");
     let stage = window.get_by_label("mosaic").rect();
     let (from, to) = (stage.center() - vec2(60.0, 0.0), stage.center() + vec2(60.0, 0.0));
     window.hover_at(from);
@@ -329,6 +327,8 @@ fn what_is_painted_becomes_a_map_once_the_brush_is_lifted() {
     assert_eq!((at(30, 20), at(59, 0)), (255, 0));
     click(&mut window, "Clear");
     assert_eq!(asked(&mut window).expect("it changed").weight, None);
+    press(&mut window, Key::B);
+    assert!(!window.state().brush.is_on);
 }
 
 #[test]
@@ -342,7 +342,7 @@ fn the_form_saves_in_any_format_and_asks_before_it_replaces_a_file() {
     assert!(window.get_by_label("file to save").accesskit_node().value().is_some_and(|path| path.contains("woman")));
     click(&mut window, "format");
     click(&mut window, "svg: vectors, one element for each tile");
-    click(&mut window, "another size than 60 px");
+    click(&mut window, "4,096");
     click(&mut window, "Save file");
     let saved = SaveOrder { path: PathBuf::from("photos/woman-mosaic.svg"), long_side_px: Some(4_096) };
     assert!(matches!(&orders(&mut window)[..], [Order::Save(save)] if *save == saved));
@@ -406,6 +406,8 @@ fn dialogs_of_the_desktop_are_asked_for_where_there_are_any() {
     window.state_mut().without_dialogs(&Request::Open);
     window.run();
     window.get_by_label("path to open");
+    press(&mut window, Key::Escape);
+    assert!(window.query_by_label("path to open").is_none(), "Escape closes it");
 
     window.state_mut().has_dialogs = true;
     click(&mut window, "Own shape…");
