@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// Longer than anything takes on a busy machine.
@@ -22,19 +23,31 @@ fn missing(program: &str, package: &str, error: &std::io::Error) -> ! {
 
 impl Display {
     /// A display of this size in px, with nothing on it.
+    ///
+    /// Its number is that of no display before it: a server that ends would take the socket of the next one away, if
+    /// that had the same number.
     pub fn start(width_px: u32, height_px: u32) -> Self {
+        static STARTED: AtomicU32 = AtomicU32::new(0);
         let screen = format!("{width_px}x{height_px}x24");
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap_or_else(|error| missing("Xvfb", "xvfb", &error));
-        let mut number = String::new();
-        let told = server.stdout.take().expect("it is piped");
-        BufReader::new(told).read_line(&mut number).expect("Xvfb tells its display");
-        assert!(!number.trim().is_empty(), "Xvfb does not start");
-        Self { server, manager: None, name: format!(":{}", number.trim()) }
+        for _ in 0..20 {
+            let count = STARTED.fetch_add(1, Ordering::Relaxed);
+            let name = format!(":{}", 100 + (std::process::id() * 64 + count) % 30_000);
+            let mut server = Command::new("Xvfb")
+                .args([&name, "-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp"])
+                .stdout(Stdio::piped())
+                .stderr(Stdio::null())
+                .spawn()
+                .unwrap_or_else(|error| missing("Xvfb", "xvfb", &error));
+            // It tells its number once it listens, and nothing if another one has it.
+            let mut told = String::new();
+            let stdout = server.stdout.take().expect("it is piped");
+            BufReader::new(stdout).read_line(&mut told).expect("it can be read");
+            if !told.trim().is_empty() {
+                return Self { server, manager: None, name };
+            }
+            server.wait().expect("it has ended");
+        }
+        panic!("Xvfb does not start");
     }
 
     /// Lets openbox manage the windows.

@@ -42,7 +42,13 @@ impl Viewer {
             .stdout(Stdio::null())
             .spawn()
             .expect("the program starts");
-        let window = display.window("- smalti", || process.try_wait().expect("it can be asked").is_none());
+        let window = display.window("- smalti", || {
+            let Some(status) = process.try_wait().expect("it can be asked") else { return true };
+            let mut said = String::new();
+            let stderr = process.stderr.as_mut().expect("it is piped");
+            stderr.read_to_string(&mut said).expect("messages are UTF-8");
+            panic!("the program ended with {status} before its window came: {said}");
+        });
         let told = || {
             let told = Command::new("xwininfo").args(["-id", &window, "-display", display.name()]).output();
             String::from_utf8_lossy(&told.expect("xwininfo runs").stdout).into_owned()
