@@ -59,7 +59,18 @@ impl Display {
             .spawn()
             .unwrap_or_else(|error| missing("openbox", "openbox", &error));
         self.manager = Some(manager);
-        self
+        // A window that comes while it takes over is never shown.
+        let began = Instant::now();
+        let asked = ["-root", "-display", &self.name, "_NET_SUPPORTING_WM_CHECK"];
+        loop {
+            let told = Command::new("xprop").args(asked).output();
+            let told = told.unwrap_or_else(|error| missing("xprop", "x11-utils", &error));
+            if String::from_utf8_lossy(&told.stdout).contains("window id") {
+                return self;
+            }
+            assert!(began.elapsed() < PATIENCE, "openbox does not begin");
+            std::thread::sleep(Duration::from_millis(50));
+        }
     }
 
     /// What DISPLAY is set to.
