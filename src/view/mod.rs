@@ -14,6 +14,7 @@ mod camera;
 mod course;
 mod dialogs;
 mod interface;
+mod looking;
 mod news;
 mod opened;
 mod opening;

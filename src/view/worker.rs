@@ -8,16 +8,15 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::{Duration, Instant};
 
 use super::course::Course;
+use super::looking::{Looking, Wanted};
 use super::news::{Ask, Desk, Doing, Moment, Note, Order, PictureNews, SaveOrder, Standing};
 use super::opened::{Open, Origin, pasted};
 use super::opening::{self, Found, Snapshots};
 use super::rescue;
 use super::saving::{self, Redraw};
 use super::wishes::Wishes;
-use crate::cpu::CpuPainter;
 use crate::error::{Error, Result};
 use crate::evolve::cells::EVALS_PER_FLY;
-use crate::model::{Canvas, Painter, Population, Rgb};
 use crate::studio::{Device, Picture, Script, Session, Step, WrittenRecipe};
 
 /// Time between two pieces of news about the tiles: ten frames a second at most. What they cost a search on the same
@@ -97,8 +96,9 @@ struct Worker<'d> {
     course: Course,
     is_running: bool,
     told: Instant,
-    /// What was told last of: evals, whether marginal fitness and errors of pixels were there, and what was going on.
-    told_of: Option<(u64, bool, bool, Doing)>,
+    /// What was told last of: evals, what was looked at, and what was going on.
+    told_of: Option<(u64, Wanted, Doing)>,
+    looking: Looking,
     clock: (Instant, u64),
     /// How many pictures were opened.
     serial: u64,
@@ -122,6 +122,7 @@ impl<'d> Worker<'d> {
             is_running: false,
             told: Instant::now(),
             told_of: None,
+            looking: Looking::default(),
             clock: (Instant::now(), 0),
             serial: 0,
             is_rescued: false,
@@ -254,6 +255,7 @@ impl<'d> Worker<'d> {
         self.course = Course::default();
         self.clock = (Instant::now(), 0);
         self.told_of = None;
+        self.looking.forget();
         self.renew_picture();
         self.desk.tell(|news| news.is_unsaved = false);
     }
@@ -339,15 +341,17 @@ impl<'d> Worker<'d> {
     fn tell(&mut self, now: Instant) -> Result<()> {
         let Some(session) = &mut self.session else { return Ok(()) };
         let evals = session.evals();
-        let wants_marginal = self.desk.wants_marginal.load(Ordering::Relaxed);
-        let wants_error_map = self.desk.wants_error_map.load(Ordering::Relaxed);
+        let wanted = Wanted {
+            marginal: self.desk.wants_marginal.load(Ordering::Relaxed),
+            error_map: self.desk.wants_error_map.load(Ordering::Relaxed),
+        };
         let doing = match session.stop_reason() {
             Some(reason) => Doing::Done(reason),
             None if self.is_running => Doing::Running,
             None => Doing::Paused,
         };
         self.told = now;
-        let known = Some((evals, wants_marginal, wants_error_map, doing));
+        let known = Some((evals, wanted, doing));
         if self.told_of == known {
             // A window that nothing happens in is not woken.
             return Ok(());
@@ -357,9 +361,7 @@ impl<'d> Worker<'d> {
         let tiles = Arc::new(session.population()?);
         let pixel_count = u64::from(tiles.width_px) * u64::from(tiles.height_px);
         let error = session.sae()? as f64 / (pixel_count * 3) as f64;
-        let marginal = if wants_marginal { Some(Arc::new(session.marginal()?)) } else { None };
-        let target = if wants_error_map { Some(session.target()) } else { None };
-        let error_map = target.map(|target| errors(&tiles, &target.pixels)).transpose()?.map(Arc::new);
+        let looked = self.looking.look(session, &tiles, wanted, self.is_running)?;
         let (since, before) = self.clock;
         let seconds = now.duration_since(since).as_secs_f64();
         self.course.add(evals, error, &tiles);
@@ -375,7 +377,7 @@ impl<'d> Worker<'d> {
         let command = saving::command(&self.script, is_at_end, input, None);
         let course = Arc::clone(self.course.moments());
         self.desk.tell(|news| {
-            (news.tiles, news.marginal, news.error_map) = (Some(tiles), marginal, error_map);
+            (news.tiles, news.marginal, news.error_map) = (Some(tiles), looked.marginal, looked.error_map);
             (news.standing, news.doing, news.course, news.command) = (standing, doing, course, command);
         });
         Ok(())
@@ -431,14 +433,4 @@ fn budget(session: &mut Session<'_>, usual: u64, effort: Option<u64>, keeps_effo
         evals = evals.max(spent + (usual / 4).max(1));
     }
     Some(evals).filter(|&evals| effort.is_some() || evals != usual)
-}
-
-/// The error of each pixel: the sum over its channels, 0 to 765.
-fn errors(tiles: &Population, target: &[Rgb]) -> Result<Vec<u16>> {
-    let canvas = Canvas::evaluation(tiles.width_px, tiles.height_px);
-    let mosaic = CpuPainter.draw(tiles, &canvas, 1)?;
-    let pixels = mosaic.over_black();
-    let of_pixel =
-        |(one, other): (&Rgb, &Rgb)| one.iter().zip(other).map(|(&one, &other)| u16::from(one.abs_diff(other))).sum();
-    Ok(pixels.iter().zip(target).map(of_pixel).collect())
 }
