@@ -254,13 +254,20 @@ fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     }
 }
 
+/// The name of this machine.
+pub(crate) fn host_name() -> Option<String> {
+    let variable = if cfg!(windows) { "COMPUTERNAME" } else { "HOSTNAME" };
+    let name = fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| std::env::var(variable));
+    name.ok().map(|name| name.trim().to_owned()).filter(|name| !name.is_empty())
+}
+
 /// How the names of this host's temporary files begin.
 fn own_prefix() -> &'static str {
     static OWN: OnceLock<String> = OnceLock::new();
     OWN.get_or_init(|| {
-        let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+        let name = host_name().unwrap_or_default();
         let plain = |char: char| if char.is_ascii_alphanumeric() || char == '.' { char } else { '-' };
-        let host: String = name.trim().chars().map(plain).take(64).collect();
+        let host: String = name.chars().map(plain).take(64).collect();
         format!("{PREFIX}{host}{HOST_END}")
     })
 }
@@ -332,7 +339,12 @@ fn remove_folder_unless_in_use(path: &Path) -> io::Result<()> {
     if lock.try_lock().is_err() {
         return Ok(());
     }
-    match fs::remove_dir_all(path) {
+    let removed = fs::remove_dir_all(path).or_else(|error| {
+        // A file that is open may keep its folder there.
+        drop(lock);
+        if cfg!(windows) { fs::remove_dir_all(path) } else { Err(error) }
+    });
+    match removed {
         // A child of the killed process still writes into it. A later sweep may succeed.
         Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => File::create(path.join(LOCK)).map(drop),
         removed => removed,

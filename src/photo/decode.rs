@@ -283,6 +283,10 @@ pub(crate) fn why_unreadable(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => "there is no such file; check its name".to_owned(),
         io::ErrorKind::IsADirectory => "is a folder; name a file in it".to_owned(),
+        // Windows does not tell the two apart.
+        io::ErrorKind::PermissionDenied if cfg!(windows) => {
+            "is a folder, or may not be read; name a file, or change its permissions".to_owned()
+        }
         io::ErrorKind::PermissionDenied => "may not be read; change its permissions".to_owned(),
         io::ErrorKind::InvalidFilename => "its name is too long; shorten it".to_owned(),
         _ => format!("cannot be read, since {}; try a copy of it", in_words(error)),

@@ -265,7 +265,11 @@ mod tests {
     }
 
     fn relative(found: Result<Vec<Found>>) -> Vec<String> {
-        found.expect("all can be read").iter().map(|one| one.relative.display().to_string()).collect()
+        found
+            .expect("all can be read")
+            .iter()
+            .map(|one| one.relative.display().to_string().replace('\\', "/"))
+            .collect()
     }
 
     #[test]

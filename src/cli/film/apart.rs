@@ -155,7 +155,9 @@ mod tests {
 
     #[test]
     fn a_percent_sign_in_the_name_of_a_folder_is_no_place_for_a_number() {
-        assert_eq!(pattern(Path::new("50%/a%d")), "file:50%%/a%%d/%08d.png");
+        let folder = Path::new("50%").join("a%d");
+        let expected = Path::new("file:50%%").join("a%%d").join("%08d.png");
+        assert_eq!(pattern(&folder), expected);
     }
 
     #[test]

@@ -143,7 +143,11 @@ fn relative_of(input: &Path) -> PathBuf {
 /// The id of each picture: the one in the manifest, or else its path below the named folder. The path loses its ending
 /// if it stays unique.
 fn ids(named: &[(&ManifestRow, &Path)]) -> Result<Vec<String>> {
-    let short = |relative: &Path| spelt(relative.with_extension("").as_os_str());
+    let short = |relative: &Path| {
+        let text = spelt(relative.with_extension("").as_os_str());
+        // The same on every system, so that a batch may go on elsewhere.
+        if cfg!(windows) { text.replace('\\', "/") } else { text }
+    };
     let mut counts: HashMap<String, usize> = HashMap::new();
     for (row, relative) in named {
         *counts.entry(row.id.clone().unwrap_or_else(|| short(relative))).or_default() += 1;

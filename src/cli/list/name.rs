@@ -119,10 +119,10 @@ mod tests {
     #[test]
     fn placeholders_are_filled_in() {
         let known = Known { relative: Path::new("trip/p 1.JPG"), id: "trip/p 1", group: Some("g"), index: 4, seed: 9 };
-        let name = |text: &str| parse(text).expect("it is a name").path(&known, "svg").display().to_string();
-        assert_eq!(name("{dir}/{stem}.{ext}"), "trip/p 1.svg");
-        assert_eq!(name("{group}/{index}-{stem}-{suffix}-{seed}.{ext}"), "g/5-p 1-JPG-9.svg");
-        assert_eq!(name("{id}.{ext}"), "trip/p 1.svg");
+        let name = |text: &str| parse(text).expect("it is a name").path(&known, "svg");
+        assert_eq!(name("{dir}/{stem}.{ext}"), Path::new("trip/p 1.svg"));
+        assert_eq!(name("{group}/{index}-{stem}-{suffix}-{seed}.{ext}"), Path::new("g/5-p 1-JPG-9.svg"));
+        assert_eq!(name("{id}.{ext}"), Path::new("trip/p 1.svg"));
         let flat = Known { relative: Path::new("a.png"), id: "a", group: None, index: 0, seed: 0 };
         assert_eq!(parse("{dir}/{stem}.{ext}").expect("it is a name").path(&flat, "png"), Path::new("a.png"));
     }

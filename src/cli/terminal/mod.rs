@@ -107,9 +107,3 @@ pub(crate) fn end_process(failure: &Error) -> ! {
 pub(crate) fn error(sentence: &str) {
     say(&format!("smalti: {sentence}"));
 }
-
-/// The name of this machine.
-pub(crate) fn host_name() -> Option<String> {
-    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| std::env::var("HOSTNAME"));
-    name.ok().map(|name| name.trim().to_owned()).filter(|name| !name.is_empty())
-}

@@ -4,11 +4,9 @@
 //! here loads it.
 
 use std::path::PathBuf;
-use std::ptr::null;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use renderdoc::{RenderDoc, V110};
-
+use super::in_application::InApplication;
 use crate::error::{Error, Result};
 use crate::vk::{Device, PassTime, Submission, SubmissionObserver};
 
@@ -46,7 +44,7 @@ pub(crate) struct Capture {
 
 #[derive(Debug)]
 struct State {
-    renderdoc: RenderDoc<V110>,
+    renderdoc: InApplication,
     /// How many captures there were before ours.
     earlier: u32,
     /// Submissions made so far.
@@ -63,9 +61,9 @@ impl Capture {
         let unwatched = "--capture: RenderDoc was not loaded with the program; run the same command under `renderdoccmd \
                          capture --wait-for-exit --working-dir . smalti ..`, from Debian's package renderdoc or \
                          renderdoc.org";
-        let renderdoc = is_watched.then(|| RenderDoc::new().ok()).flatten();
-        let renderdoc: RenderDoc<V110> = renderdoc.ok_or_else(|| Error::Usage(unwatched.to_owned()))?;
-        let earlier = renderdoc.get_num_captures();
+        let renderdoc = is_watched.then(InApplication::find).flatten();
+        let renderdoc = renderdoc.ok_or_else(|| Error::Usage(unwatched.to_owned()))?;
+        let earlier = renderdoc.count();
         Ok(Self { range, state: Mutex::new(State { renderdoc, earlier, submissions: 0 }) })
     }
 
@@ -83,9 +81,9 @@ impl Capture {
             )));
         }
         if state.submissions < last {
-            state.renderdoc.end_frame_capture(null(), null());
+            state.renderdoc.end();
         }
-        let (path, _) = state.renderdoc.get_capture(state.earlier).ok_or_else(|| Error::Output {
+        let path = state.renderdoc.file(state.earlier).ok_or_else(|| Error::Output {
             path: "--capture".into(),
             reason: "RenderDoc wrote no capture; see its log".to_owned(),
         })?;
@@ -102,13 +100,13 @@ impl SubmissionObserver for Capture {
         let mut state = self.state();
         state.submissions = state.submissions.max(submission.number);
         if submission.number == self.range.first {
-            state.renderdoc.start_frame_capture(null(), null());
+            state.renderdoc.start();
         }
     }
 
     fn after(&self, _device: &Arc<Device>, submission: &Submission<'_>, _passes: &[PassTime]) {
         if submission.number == self.range.last {
-            self.state().renderdoc.end_frame_capture(null(), null());
+            self.state().renderdoc.end();
         }
     }
 }

@@ -5,6 +5,7 @@
 
 mod capture;
 mod device_track;
+mod in_application;
 mod traced;
 mod tracer;
 

@@ -264,8 +264,6 @@ fn json(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::process::{Command, Stdio};
-
     use super::*;
 
     fn plan() -> Plan {
@@ -286,8 +284,11 @@ mod tests {
         assert_eq!(large.shard_name(3), "shard-000003.jsonl");
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_shell_can_read_every_script() {
+        use std::process::{Command, Stdio};
+
         let plan = plan();
         for (shell, script) in [("bash", plan.slurm()), ("sh", plan.parallel())] {
             let checked = Command::new(shell).args(["-n", "-c", &script]).stderr(Stdio::inherit()).status();

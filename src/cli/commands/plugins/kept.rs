@@ -293,7 +293,7 @@ mod tests {
                 if path.is_dir() {
                     open.push(path.clone());
                 }
-                found.push(path.strip_prefix(folder).expect("it is below").display().to_string());
+                found.push(path.strip_prefix(folder).expect("it is below").display().to_string().replace('\\', "/"));
             }
         }
         found.sort();

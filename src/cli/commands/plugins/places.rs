@@ -244,7 +244,8 @@ mod tests {
 
     fn folders(around: &Surroundings, host: Host) -> Vec<String> {
         let home = around.home.clone().expect("it was given one");
-        let below = |place: &Place| place.folder.strip_prefix(&home).map(|path| path.display().to_string());
+        let below =
+            |place: &Place| place.folder.strip_prefix(&home).map(|path| path.display().to_string().replace('\\', "/"));
         around.places(host).iter().map(|place| below(place).expect("it is below the home")).collect()
     }
 
