@@ -9,7 +9,7 @@ use std::io::{self, BufReader, Cursor, Read, Write};
 use std::path::Path;
 
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+use zip::{CompressionMethod, DateTime, System, ZipArchive, ZipWriter};
 
 use crate::error::{Error, Result};
 use crate::guard;
@@ -136,7 +136,10 @@ pub fn encode(layers: &Layers, merged: &[u8]) -> Result<Vec<u8>> {
 
 fn write_members(layers: &Layers, merged: &[u8]) -> zip::result::ZipResult<Vec<u8>> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    let options = SimpleFileOptions::default().last_modified_time(DateTime::default()).unix_permissions(0o644);
+    let options = SimpleFileOptions::default()
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644)
+        .system(System::Unix);
     let (stored, deflated) = (
         options.compression_method(CompressionMethod::Stored),
         options.compression_method(CompressionMethod::Deflated),

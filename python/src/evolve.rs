@@ -1,10 +1,13 @@
 //! The one call that does the work.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
-use pyo3::exceptions::{PyBaseException, PyValueError};
+use pyo3::exceptions::{PyBaseException, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyString};
 use smalti::{Error, Mask, OnDry, Recipe, WrittenRecipe};
@@ -17,9 +20,14 @@ use crate::picture;
 /// Time between two calls of `progress`: about ten a second.
 const BETWEEN_CALLS: Duration = Duration::from_millis(100);
 /// Time between two looks for a signal.
-const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
+/// How long an interrupted call waits for its work to end. A round of a large picture may take longer, and then ends
+/// by itself.
+pub(crate) const ENDING_MAX: Duration = Duration::from_millis(100);
 
 /// Evolves a picture: a path, or an array of bytes. `words` are the flags of `smalti evolve`.
+///
+/// The work has a thread of its own, so that a signal is heard at any time, whatever the work is at.
 #[pyfunction]
 #[pyo3(signature = (picture, words, device=None, progress=None))]
 pub(crate) fn evolve(
@@ -30,19 +38,76 @@ pub(crate) fn evolve(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Mosaic> {
     let source = Source::of(picture)?;
-    let Wanted { recipe, is_lenient } = Wanted::of(words)?;
-    let named = device.map(|device| &device.get().0);
-    let mut watch = Watch::new(progress);
-    let made = py.detach(|| -> Result<smalti::Mosaic, Error> {
-        let picture = source.open(is_lenient)?;
-        recipe.make(&picture, device::or_usual(named)?, |standing| watch.goes_on(standing))
-    });
-    match watch.raised {
-        Some(raised) => Err(raised),
-        None => {
-            let made = made.map_err(|error| exception(&error))?;
-            Ok(Mosaic(made, device.map(|device| device.clone().unbind())))
+    let wanted = Wanted::of(words)?;
+    let device = device.map(|device| device.clone().unbind());
+    let watch = Arc::new(Watch::default());
+    let (sender, made) = channel();
+    let work = {
+        let (watch, device, is_watched) =
+            (Arc::clone(&watch), device.as_ref().map(|one| one.clone_ref(py)), progress.is_some());
+        move || {
+            let named = device.as_ref().map(|device| &device.get().0);
+            let mut told = Instant::now();
+            let made = source.open(wanted.is_lenient).and_then(|picture| {
+                wanted.recipe.make(&picture, device::or_usual(named)?, |standing| {
+                    if is_watched && told.elapsed() >= BETWEEN_CALLS {
+                        told = Instant::now();
+                        watch.tell((standing.share(), standing.objective()));
+                    }
+                    !watch.is_over.load(Ordering::Relaxed)
+                })
+            });
+            // Nobody may wait for it any more.
+            let _ = sender.send(made);
         }
+    };
+    let started = std::thread::Builder::new().name("smalti".to_owned()).spawn(work);
+    started.map_err(|error| PyRuntimeError::new_err(format!("no thread can be started: {error}")))?;
+    // A receiver is for one thread, and Python is let go while this one waits.
+    let made = Mutex::new(made);
+    let wait = |time| py.detach(|| made.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(time));
+    loop {
+        match wait(BETWEEN_LOOKS) {
+            Ok(made) => return Ok(Mosaic(made.map_err(|error| exception(&error))?, device)),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(PyRuntimeError::new_err("a thread of smalti has panicked"));
+            }
+        }
+        if let Err(raised) = watch.look(py, progress.as_ref()) {
+            watch.is_over.store(true, Ordering::Relaxed);
+            let _ = wait(ENDING_MAX);
+            return Err(raised);
+        }
+    }
+}
+
+/// What the thread that works and the one that waits tell each other.
+#[derive(Default)]
+struct Watch {
+    /// Whether the work is to end.
+    is_over: AtomicBool,
+    /// How far it is, and its error, unless that was fetched.
+    standing: Mutex<Option<(f64, i64)>>,
+}
+
+impl Watch {
+    fn tell(&self, standing: (f64, i64)) {
+        *self.standing.lock().unwrap_or_else(PoisonError::into_inner) = Some(standing);
+    }
+
+    /// Looks for signals, and tells Python how far the work is where that is new. Fails with what Python raised.
+    fn look(&self, py: Python<'_>, progress: Option<&Py<PyAny>>) -> PyResult<()> {
+        py.check_signals()?;
+        let standing = self.standing.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let (Some(progress), Some(standing)) = (progress, standing) {
+            let answer = progress.call1(py, standing)?;
+            // A function without a result goes on.
+            if !answer.is_none(py) && !answer.bind(py).is_truthy()? {
+                self.is_over.store(true, Ordering::Relaxed);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -70,44 +135,6 @@ impl Source {
             Self::File(path) => smalti::Picture::open(path),
             Self::Pixels(picture) => Ok(picture),
         }
-    }
-}
-
-/// Tells how far the work is, and looks for signals; the work itself knows nothing of Python.
-struct Watch {
-    progress: Option<Py<PyAny>>,
-    called: Instant,
-    looked: Instant,
-    raised: Option<PyErr>,
-}
-
-impl Watch {
-    fn new(progress: Option<Py<PyAny>>) -> Self {
-        let now = Instant::now();
-        Self { progress, called: now, looked: now, raised: None }
-    }
-
-    fn goes_on(&mut self, standing: &mut smalti::Progress<'_, '_>) -> bool {
-        let now = Instant::now();
-        if now.duration_since(self.looked) < BETWEEN_LOOKS {
-            return true;
-        }
-        self.looked = now;
-        let is_due = self.progress.is_some() && now.duration_since(self.called) >= BETWEEN_CALLS;
-        let answer = Python::attach(|py| {
-            py.check_signals()?;
-            let Some(progress) = self.progress.as_ref().filter(|_| is_due) else { return Ok(true) };
-            let answer = progress.call1(py, (standing.share(), standing.objective()))?;
-            // A function without a result goes on.
-            Ok(answer.is_none(py) || answer.bind(py).is_truthy()?)
-        });
-        if is_due {
-            self.called = Instant::now();
-        }
-        answer.unwrap_or_else(|raised| {
-            self.raised = Some(raised);
-            false
-        })
     }
 }
 

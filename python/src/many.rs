@@ -13,7 +13,7 @@ use pyo3::types::{PyDict, PyIterator};
 use smalti::{Error, Recipe, make_all};
 
 use crate::device::{self, Device};
-use crate::evolve::{Source, Wanted};
+use crate::evolve::{ENDING_MAX, Source, Wanted};
 use crate::failure::exception;
 use crate::mosaic::Mosaic;
 
@@ -35,6 +35,8 @@ pub(crate) struct Many {
     made: Mutex<Option<Receiver<Made>>>,
     worker: Mutex<Option<JoinHandle<PyResult<()>>>>,
     is_over: Arc<AtomicBool>,
+    /// Whether a signal came while Python waited.
+    is_interrupted: AtomicBool,
     /// Whether the iterator of Python is asked for a picture.
     is_reading: Arc<AtomicBool>,
     device: Option<Py<Device>>,
@@ -69,7 +71,14 @@ pub(crate) fn evolve_many(
     };
     let started = std::thread::Builder::new().name("smalti".to_owned()).spawn(move || worker.work());
     let worker = started.map_err(|error| PyRuntimeError::new_err(format!("no thread can be started: {error}")))?;
-    Ok(Many { made: Mutex::new(Some(made)), worker: Mutex::new(Some(worker)), is_over, is_reading, device })
+    Ok(Many {
+        made: Mutex::new(Some(made)),
+        worker: Mutex::new(Some(worker)),
+        is_over,
+        is_interrupted: AtomicBool::new(false),
+        is_reading,
+        device,
+    })
 }
 
 #[pymethods]
@@ -91,22 +100,28 @@ impl Many {
                     return Ok(Some((number, Py::new(py, Mosaic(mosaic, device))?.into_any())));
                 }
                 Ok((number, Err(raised))) => return Ok(Some((number, raised.into_value(py).into_any()))),
-                Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+                Err(RecvTimeoutError::Timeout) => py.check_signals().inspect_err(|_| {
+                    self.is_interrupted.store(true, Ordering::Relaxed);
+                })?,
                 Err(RecvTimeoutError::Disconnected) => return self.close(py).map(|()| None),
             }
         }
     }
 
-    /// Ends the work, and waits until it has ended. It waits not long for an iterator that gives no next picture.
+    /// Ends the work, and waits until it has ended. It does not wait long after a signal, or for an iterator that gives
+    /// no next picture.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         self.is_over.store(true, Ordering::Relaxed);
         // Without a receiver nobody waits to hand something over.
         py.detach(|| drop(self.made.lock().unwrap_or_else(PoisonError::into_inner).take()));
         let Some(worker) = self.worker.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
-        let mut read_since = None;
+        let (closed, mut read_since) = (Instant::now(), None);
         while !worker.is_finished() {
             py.detach(|| std::thread::sleep(BETWEEN_CHECKS));
             py.check_signals()?;
+            if self.is_interrupted.load(Ordering::Relaxed) && closed.elapsed() > ENDING_MAX {
+                return Ok(());
+            }
             if !self.is_reading.load(Ordering::Relaxed) {
                 read_since = None;
             } else if read_since.get_or_insert_with(Instant::now).elapsed() > READING_MAX {

@@ -5,7 +5,7 @@ use std::io::{Cursor, Write};
 use npyz::{AutoSerialize, DType, WriterBuilder};
 use serde_json::{Map, Value};
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
+use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use super::{GENE_COLUMNS, HEADER_KEYS, HEADER_MEMBER, Header, SCHEMA};
 use crate::error::{Error, Result};
@@ -122,7 +122,7 @@ impl Members {
         Self { zip: ZipWriter::new(Cursor::new(Vec::new())), thrift }
     }
 
-    /// Begins a member. Date, permissions and level are fixed, so only the content decides the bytes.
+    /// Begins a member. Date, permissions, system and level are fixed, so only the content decides the bytes.
     fn start(&mut self, name: &str) -> zip::result::ZipResult<()> {
         let is_gene = || GENE_COLUMNS.iter().any(|column| npyz::npz::file_name_from_array_name(column) == name);
         let (method, level) = match self.thrift {
@@ -134,7 +134,8 @@ impl Members {
             .compression_method(method)
             .compression_level(level)
             .last_modified_time(DateTime::default())
-            .unix_permissions(0o644);
+            .unix_permissions(0o644)
+            .system(System::Unix);
         self.zip.start_file(name, options)
     }
 
