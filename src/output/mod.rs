@@ -254,20 +254,13 @@ fn create_in(folder: &Path) -> io::Result<NamedTempFile> {
     }
 }
 
-/// The name of this machine.
-pub(crate) fn host_name() -> Option<String> {
-    let variable = if cfg!(windows) { "COMPUTERNAME" } else { "HOSTNAME" };
-    let name = fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| std::env::var(variable));
-    name.ok().map(|name| name.trim().to_owned()).filter(|name| !name.is_empty())
-}
-
 /// How the names of this host's temporary files begin.
 fn own_prefix() -> &'static str {
     static OWN: OnceLock<String> = OnceLock::new();
     OWN.get_or_init(|| {
-        let name = host_name().unwrap_or_default();
+        let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
         let plain = |char: char| if char.is_ascii_alphanumeric() || char == '.' { char } else { '-' };
-        let host: String = name.chars().map(plain).take(64).collect();
+        let host: String = name.trim().chars().map(plain).take(64).collect();
         format!("{PREFIX}{host}{HOST_END}")
     })
 }

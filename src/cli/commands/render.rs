@@ -24,7 +24,6 @@ use crate::error::{Error, Result};
 use crate::evolve::{ALGORITHM_VERSION, PaperScheme, begin_from};
 use crate::model::target::TARGET_SIDE_MAX_PX;
 use crate::model::{Backdrop, Blend, Grout, Population};
-use crate::output;
 use crate::studio::{
     Device, Drawn, Dress, KEEPS_MASKS, Look, Provenance, SUPERSAMPLING_MAX, Told, View, backdrop, drawing_bytes,
     hexadecimal, look_asked, population_sha256,
@@ -198,7 +197,7 @@ impl RenderRow {
             draw_ms: 0.0,
             save_ms: 0.0,
             device: None,
-            host: output::host_name(),
+            host: terminal::host_name(),
             version: env!("CARGO_PKG_VERSION"),
             error: None,
         }

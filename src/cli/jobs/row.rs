@@ -7,11 +7,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::cli::terminal::interrupt::EXIT_INTERRUPTED;
-use crate::cli::terminal::{advice, print_json};
+use crate::cli::terminal::{advice, host_name, print_json};
 use crate::error::{Error, Result};
 use crate::evolve::{Ending, Spread, Tally};
 use crate::model::Population;
-use crate::output;
 use crate::studio::Scheme;
 
 /// The outcome of the work on a picture.
@@ -126,7 +125,7 @@ impl Row {
             ended_at: None,
             device: None,
             shard: None,
-            host: output::host_name(),
+            host: host_name(),
             version: env!("CARGO_PKG_VERSION"),
             error: None,
         }

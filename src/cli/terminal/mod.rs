@@ -107,3 +107,10 @@ pub(crate) fn end_process(failure: &Error) -> ! {
 pub(crate) fn error(sentence: &str) {
     say(&format!("smalti: {sentence}"));
 }
+
+/// The name of this machine.
+pub(crate) fn host_name() -> Option<String> {
+    let variable = if cfg!(windows) { "COMPUTERNAME" } else { "HOSTNAME" };
+    let name = std::fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| std::env::var(variable));
+    name.ok().map(|name| name.trim().to_owned()).filter(|name| !name.is_empty())
+}
